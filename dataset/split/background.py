@@ -109,8 +109,9 @@ def find_background(
         known = _judged("plain", None, known_rgb, colors, np.array(known_rgb))
         return replace(known, inset=inset)
     found = _pattern(rgba, places, colors) or _richest_worth_it(rgba, places, colors, inset)
-    if found.sure < SURE_ENOUGH:
-        found = _steps(rgba, places, colors, inset) or found
+    if found.kind in ("gradient", "uneven") or found.sure < SURE_ENOUGH:
+        steps = _steps(rgba, places, colors, inset)
+        found = steps if steps is not None and _is_worth_it(steps, found) else found
     found = replace(found, inset=inset)
     if found.sure < LEAST_SURE:
         raise SheetError(

@@ -19,18 +19,20 @@ from toonset.view import Box
 
 MARGIN = 0.08  # of the shorter side: the border that holds at least a part of the pattern
 LEAST_MARGIN_PX = 24
-BINS = 16  # levels per bin of the border's colours
-COMMON = 0.003  # of the border: a colour of the pattern
+BINS = 16  # levels per bin, and bins per channel, of the border's colours
+COMMON = 0.02  # of the border: a colour of the pattern
 WINDOW_PX = 1024  # side of the part whose autocorrelation shows the nearest peaks
 NEAREST_PX = 3
 LEAST_ODD = 0.005  # of the border: less in other colours is no pattern
-LEAST_PEAK = 0.6  # of the autocorrelation at no lag
+LEAST_PEAK = 0.5  # of the autocorrelation at no lag
 FEWEST = 6  # repetitions in the sheet's shorter side
 LIKE_THE_BEST = (0.9, 0.75, 0.6)  # of the highest peak: which peaks are looked at
 ACROSS = 0.4  # sine of the angle between the two vectors
 MOST_SAMPLES = 2_000_000  # pixels that a cell's colours are medians of
-EXPLAINED = 0.7  # of the border's pixels that one colour leaves unexplained
-CLOSE = 12  # levels from the cell's colours
+EXPLAINED = 0.5  # of the border's pixels that one colour leaves unexplained
+ODD = 5  # levels from the commonest colour: another one
+STRONG = 90  # percentile of these differences: the pattern's own, of which the half is looked at
+CLOSE = 12  # levels from the cell's colours, or half the pattern's contrast: explained
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,11 +97,13 @@ def fit_pattern(
     places = np.nonzero(_margin(rgb.shape[:2]))
     step = max(1, len(places[0]) // MOST_SAMPLES)
     border = places[0][::step], places[1][::step]
-    odd = np.abs(rgb[border].astype(np.int16) - np.array(dominant, np.int16)).max(axis=1) > CLOSE
+    contrast = np.abs(rgb[border].astype(np.int16) - np.array(dominant, np.int16)).max(axis=1)
+    odd = contrast > ODD
     if odd.mean() < LEAST_ODD:
         return None
-    counts = np.bincount(_codes(rgb[border]), minlength=BINS**3)
-    common = counts >= COMMON * counts.sum()
+    odd = contrast > max(ODD, np.percentile(contrast[odd], STRONG) / 2)  # JPEG's ripples are less
+    close = min(CLOSE, float(np.median(contrast[odd])) / 2)
+    common = _common_colors(rgb[border], odd, dominant)
     window = rgb[:WINDOW_PX, :WINDOW_PX]
     found = _lattices(_lags(window, common[_codes(window)]), min(rgb.shape[:2]))
     if not found:
@@ -111,8 +115,8 @@ def fit_pattern(
         low, high = _cell(rgb, like, lattice)
         plate = _laid(rgb, lattice, low, high)
         off = cv2.absdiff(rgb, plate).max(axis=2)
-        explained = float(np.mean(off[border][odd] <= CLOSE))
-        if explained >= EXPLAINED and _shows_figures(off > CLOSE, lattice):
+        explained = float(np.mean(off[border][odd] <= close))
+        if explained >= EXPLAINED and _shows_figures(off > close, lattice):
             return Plate(plate, dominant, f"repeats every {lattice}")
     return None
 
@@ -122,6 +126,21 @@ def _margin(shape: tuple[int, int]) -> Bool[np.ndarray, "height width"]:
     border = np.ones(shape, dtype=bool)
     border[width : shape[0] - width, width : shape[1] - width] = False
     return border
+
+
+def _common_colors(
+    colors: UInt8[np.ndarray, "n 3"], odd: Bool[np.ndarray, " n"], dominant: tuple[int, int, int]
+) -> Bool[np.ndarray, " codes"]:
+    """Return the border's common colours and the blends of the two commonest, by their codes."""
+    counts = np.bincount(_codes(colors), minlength=BINS**3)
+    second = np.bincount(_codes(colors[odd]), minlength=BINS**3).argmax()
+    grid = np.stack(np.unravel_index(np.arange(BINS**3), (BINS,) * 3), axis=1)
+    middles = (grid + 0.5) * BINS
+    start = np.array(dominant, dtype=np.float64)
+    along = middles[second] - start
+    share = np.clip((middles - start) @ along / max(along @ along, 1e-9), 0, 1)
+    off = np.abs(middles - start - share[:, None] * along).max(axis=1)
+    return (counts >= COMMON * counts.sum()) | (off <= BINS)
 
 
 def _codes(rgb: UInt8[np.ndarray, "*n 3"]) -> Int[np.ndarray, "*n"]:

@@ -19,12 +19,14 @@ from toonset.raster import dilate
 
 LONGEST_PX = 1600  # of the copy in which steps are looked for
 MEDIAN_PX = 5  # grain and thin lines are no edges
-EDGE = 10  # levels between neighbours
+EDGE = 7  # levels between neighbours
+LEAST_PIECE = 0.0005  # of the sheet: a smaller patch is no zone
 LEAST_ZONE = 0.06  # of the border
 TOGETHER = 0.9  # of the border
 LEAST_STEP = 12  # levels: a fainter one is noise
+LEAST_PATCH = 0.01  # of the sheet: figures part a zone into patches of its colour
 CLOSE = 8  # levels from the zone's colour
-STEP_PX = 3  # half the width of a step
+STEP_PX = 6  # half the width of a step
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,9 +41,9 @@ class Zones:
     labels: Int[np.ndarray, "rows columns"]
     shrink: float
 
-    def mask(self, number: int, size_wh: tuple[int, int]) -> Bool[np.ndarray, "height width"]:
-        """Return a zone's pixels in the picture."""
-        own = (self.labels == number).view(np.uint8)
+    def mask(self, numbers: list[int], size_wh: tuple[int, int]) -> Bool[np.ndarray, "height width"]:
+        """Return the pixels of zones in the picture."""
+        own = np.isin(self.labels, numbers).view(np.uint8)
         return cv2.resize(own, size_wh, interpolation=cv2.INTER_NEAREST) > 0
 
 
@@ -85,27 +87,51 @@ def fit_steps(
         ring: its border.
     """
     size_wh = rgb.shape[1], rgb.shape[0]
-    zones = find_zones(*shrunk(rgb, LONGEST_PX), 0.0)
+    small, shrink = shrunk(rgb, LONGEST_PX)
+    zones = find_zones(small, shrink, LEAST_PIECE)
     at_border = cv2.resize(ring.view(np.uint8), zones.labels.shape[::-1], interpolation=0) > 0
-    shares = np.bincount(zones.labels[at_border], minlength=2) / max(np.count_nonzero(at_border), 1)
-    shares[0] = 0
-    numbers = np.flatnonzero(shares >= LEAST_ZONE)
-    if len(numbers) < 2:
+    groups = _of_one_color(zones, small, at_border)
+    if len(groups) < 2:
         return None
     masks, fields = [], []
-    for number in numbers:
-        mask = zones.mask(int(number), size_wh)
+    for numbers in groups:
+        mask = zones.mask(numbers, size_wh)
         field = fit_zone(rgb, mask)
         away = cv2.absdiff(rgb, field.colors((0, 0, *size_wh))).max(axis=2)
-        masks.append((away <= CLOSE) & dilate(mask, 2 * STEP_PX + round(1 / zones.shrink)))
+        masks.append((away <= CLOSE) & dilate(mask, STEP_PX + round(1 / zones.shrink)))
         fields.append(field)
     taken = np.any(masks, axis=0)
     typical = [np.array(field.typical) for field in fields]
     step = max(int(np.abs(a - b).max()) for a in typical for b in typical)
     if taken[ring].mean() < TOGETHER or step < LEAST_STEP:
         return None
-    largest = fields[int(shares[numbers].argmax())]
-    return Plate(_laid(rgb, masks, fields), largest.typical, f"{len(numbers)} zones at its border")
+    return Plate(_laid(rgb, masks, fields), fields[0].typical, f"{len(groups)} zones at its border")
+
+
+def _of_one_color(
+    zones: Zones,
+    small: UInt8[np.ndarray, "rows columns 3"],
+    at_border: Bool[np.ndarray, "rows columns"],
+) -> list[list[int]]:
+    """Return the zones that take enough of the border, those of one colour together, and patches.
+
+    Figures part a zone into several, of which some do not reach the border.
+    """
+    areas = np.bincount(zones.labels.ravel())
+    shares = np.bincount(zones.labels[at_border], minlength=len(areas)) / at_border.sum()
+    numbers = np.flatnonzero((shares > 0) | (areas >= LEAST_PATCH * zones.labels.size))
+    numbers = numbers[numbers > 0][np.argsort(-shares[numbers[numbers > 0]], kind="stable")]
+    groups: list[list[int]] = []
+    colors: list[np.ndarray] = []
+    for number in numbers.tolist():
+        color = np.median(small[zones.labels == number], axis=0)
+        same = [k for k, other in enumerate(colors) if np.abs(other - color).max() < CLOSE]
+        if same:
+            groups[same[0]].append(number)
+        elif shares[number] > 0:
+            groups.append([number])
+            colors.append(color)
+    return [group for group in groups if shares[group].sum() >= LEAST_ZONE]
 
 
 def _laid(

@@ -29,7 +29,7 @@ CELLS = 3  # that a zone ends before its edge
 THING = 0.12  # of the page's height: a drawing is no lower
 ALONE = 0.6  # of the page's height: one such drawing is enough
 AS_TALL = 0.6  # of the tallest drawing on the pages: what stands beside them counts, too
-STRIP = 0.05  # of the same: narrower things beside them are edges and shadows
+STRIP = 0.12  # of the same: narrower things beside them are edges and shadows
 UPRIGHT_DEG = 0.5
 UPRIGHT = 0.97  # of the smallest rectangle: less is a perspective
 
