@@ -12,10 +12,10 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
+from toonset.dataset.images.jpeg_noise import halo_levels, has_jpeg_grid
 from toonset.dataset.split.background_field import Field, fit_gradient, fit_smooth
 from toonset.dataset.split.background_pattern import Plate, fit_pattern
 from toonset.dataset.split.background_zones import fit_steps
-from toonset.dataset.split.jpeg_noise import halo_levels, has_jpeg_grid
 from toonset.errors import SheetError
 from toonset.view import Box, over_white
 

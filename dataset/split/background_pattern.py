@@ -21,7 +21,7 @@ MARGIN = 0.08  # of the shorter side: the border that holds at least a part of t
 LEAST_MARGIN_PX = 24
 BINS = 16  # levels per bin, and bins per channel, of the border's colours
 COMMON = 0.02  # of the border: a colour of the pattern
-WINDOW_PX = 1024  # side of the part whose autocorrelation shows the nearest peaks
+WINDOW_PX = 640  # side of the part whose autocorrelation shows the nearest peaks
 NEAREST_PX = 3
 LEAST_ODD = 0.005  # of the border: less in other colours is no pattern
 LEAST_PEAK = 0.5  # of the autocorrelation at no lag
@@ -65,9 +65,7 @@ class Lattice:
 
     vectors: Float[np.ndarray, "2 2"]
 
-    def phases(
-        self, columns: np.ndarray, rows: np.ndarray
-    ) -> tuple[Float[np.ndarray, "..."], Float[np.ndarray, "..."]]:
+    def phases(self, columns: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the places in the cell, 0 to 1 along either vector, of broadcast pixels."""
         inverse = np.linalg.inv(self.vectors)  # place = phases @ vectors
         u = columns * inverse[0, 0] + rows * inverse[1, 0]

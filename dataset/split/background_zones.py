@@ -41,7 +41,9 @@ class Zones:
     labels: Int[np.ndarray, "rows columns"]
     shrink: float
 
-    def mask(self, numbers: list[int], size_wh: tuple[int, int]) -> Bool[np.ndarray, "height width"]:
+    def mask(
+        self, numbers: list[int], size_wh: tuple[int, int]
+    ) -> Bool[np.ndarray, "height width"]:
         """Return the pixels of zones in the picture."""
         own = np.isin(self.labels, numbers).view(np.uint8)
         return cv2.resize(own, size_wh, interpolation=cv2.INTER_NEAREST) > 0
@@ -68,7 +70,9 @@ def find_zones(
     return Zones(number[np.asarray(found, dtype=np.int32)], shrink)
 
 
-def shrunk(picture: UInt8[np.ndarray, "height width c"], longest_px: int) -> tuple[np.ndarray, float]:
+def shrunk(
+    picture: UInt8[np.ndarray, "height width c"], longest_px: int
+) -> tuple[np.ndarray, float]:
     """Return a picture no longer than that, and its cells per pixel of the whole one."""
     shrink = min(1.0, longest_px / max(picture.shape[:2]))
     if shrink == 1:

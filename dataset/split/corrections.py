@@ -19,7 +19,7 @@ from toonset.dataset.split.figures.blobs import (
     find_main_blobs,
     remove_strangers,
 )
-from toonset.dataset.split.shadows import find_shadows
+from toonset.dataset.split.figures.shadows import find_shadows
 from toonset.dataset.split.touching.cut import Cut, part_touching
 
 

@@ -27,7 +27,13 @@ from toonset.dataset.split.holes import BorderLook, open_holes, outline_look
 from toonset.dataset.split.matting import cut_out, edge_softness_px
 from toonset.dataset.split.pages import Pages, find_pages
 from toonset.dataset.split.segment import SheetLayout, find_layout, find_paint
-from toonset.dataset.split.warnings import border_warnings, figure_warnings, page_warnings
+from toonset.dataset.split.warnings import (
+    border_warnings,
+    figure_warnings,
+    mark_warnings,
+    page_warnings,
+)
+from toonset.dataset.split.watermark import find_watermark, remove_watermark
 from toonset.errors import SheetError
 from toonset.palette.palette import Hex
 from toonset.palette.pixels.enlarged import Grid, find_grid
@@ -150,6 +156,10 @@ def split_picture(
     else:
         rgba, residual = remove_residual_alpha(rgba)
     ground = find_background(rgba, options.background_rgb)
+    mark = find_watermark(rgba[..., :3], ground.rgb) if ground.kind == "plain" else None
+    if mark is not None:
+        rgba = remove_watermark(rgba, mark)
+        ground = find_background(rgba, options.background_rgb)
     paint, ground = find_paint(rgba, ground)
     found = find_layout(rgba, paint, ground, options.without)
     _check(found, ground, options)
@@ -160,7 +170,7 @@ def split_picture(
         tuple(views),
         ground.rgb,
         ground.sure,
-        (*page_warnings(pages), *border_warnings(ground, found))
+        (*page_warnings(pages), *mark_warnings(mark), *border_warnings(ground, found))
         + (() if by_hand else figure_warnings(found, views, rgba)),
         () if by_hand else _left_out(found),
         (

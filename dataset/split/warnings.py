@@ -10,6 +10,7 @@ from toonset.dataset.split.figures.blobs import LOWEST, Blobs, shared_colors
 from toonset.dataset.split.figures.grouping import LEAST_PART
 from toonset.dataset.split.pages import Pages
 from toonset.dataset.split.segment import SheetLayout
+from toonset.dataset.split.watermark import Watermark
 from toonset.view import View
 
 NEARLY_A_VIEW = 0.5  # of the views' height: something left out that may be a small one
@@ -27,6 +28,16 @@ def page_warnings(pages: Pages | None) -> tuple[str, ...]:
     return (
         "the paper does not fill the picture and lies at an angle: straighten it and crop it to "
         "the paper for true proportions",
+    )
+
+
+def mark_warnings(mark: Watermark | None) -> tuple[str, ...]:
+    """Return a line if a watermark lies over the figures: their colours may keep some of it."""
+    if mark is None:
+        return ()
+    return (
+        "a watermark lies over the sheet; it was taken off the paper and flat colours: look at the "
+        "figures, or use a picture without it",
     )
 
 
