@@ -111,7 +111,8 @@ def find_background(
     found = _pattern(rgba, places, colors) or _richest_worth_it(rgba, places, colors, inset)
     if found.kind in ("gradient", "uneven") or found.sure < SURE_ENOUGH:
         steps = _steps(rgba, places, colors, inset)
-        found = steps if steps is not None and _is_worth_it(steps, found) else found
+        if steps is not None and (found.sure < SURE_ENOUGH or _is_worth_it(steps, found)):
+            found = steps
     found = replace(found, inset=inset)
     if found.sure < LEAST_SURE:
         raise SheetError(

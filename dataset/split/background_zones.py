@@ -41,6 +41,11 @@ class Zones:
     labels: Int[np.ndarray, "rows columns"]
     shrink: float
 
+    @property
+    def count(self) -> int:
+        """Return how many zones there are."""
+        return int(self.labels.max())
+
     def mask(
         self, numbers: list[int], size_wh: tuple[int, int]
     ) -> Bool[np.ndarray, "height width"]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.dataset.split.background import difference
 from toonset.raster import dilate, erode
@@ -27,10 +27,10 @@ MOST_OF_HEIGHT = 0.25  # of the sheet: a scrap is no higher
 ON_PAPER = 0.7  # of the scraps' borders that is paper or its blend with the tone
 GRID = (6, 8)  # rows and columns of the sheet
 SPREAD = 0.4  # of these that hold a scrap
-FLAT_COLORS = 16  # of the figures, the commonest
+FLAT_COLORS = 64  # of the figures, the commonest
 LEAST_FLAT = 0.005  # of the figures: a rarer colour may be another under the mark
 OPACITIES = np.linspace(0.04, 0.6, 57)
-MOST_TONES = 50_000  # pixels of the figures that tell the opacity
+NEAR = 2  # levels: rounding, twice
 SOFT = 2  # pixels: edges of letters
 
 
@@ -105,38 +105,40 @@ def remove_watermark(
     inside = rgb[drawn]
     if not len(inside):
         return np.dstack([result, rgba[..., 3]])
-    flat = _commonest(inside)
-    opacity = _opacity(inside, flat, clean, mark.tone)
+    colors, counts = _commonest(inside)
+    opacity = _opacity(colors, counts, clean, mark.tone)
+    flat = colors[counts >= LEAST_FLAT * len(inside)]
     for color, under in zip(flat, _marked(flat, clean, mark.tone, opacity), strict=True):
-        core = drawn & (np.abs(rgb - under).max(axis=2) <= 2)
+        core = drawn & (np.abs(rgb - under).max(axis=2) <= NEAR)
         edge = dilate(core, SOFT) & drawn & _is_between(rgb, color, under)
         result[core | edge] = color
     return np.dstack([result, rgba[..., 3]])
 
 
-def _commonest(colors: UInt8[np.ndarray, "n 3"]) -> UInt8[np.ndarray, "k 3"]:
-    """Return the commonest colours, but the rare ones."""
+def _commonest(
+    colors: UInt8[np.ndarray, "n 3"],
+) -> tuple[UInt8[np.ndarray, "k 3"], Int[np.ndarray, " k"]]:
+    """Return the commonest colours and their counts, in that order."""
     codes = colors.astype(np.int32) @ np.array([65536, 256, 1], np.int32)
     values, counts = np.unique(codes, return_counts=True)
-    common = np.argsort(-counts)[:FLAT_COLORS]
-    common = common[counts[common] >= LEAST_FLAT * len(colors)]
+    common = np.argsort(-counts, kind="stable")[:FLAT_COLORS]
     flat = [values[common] >> 16, values[common] >> 8 & 255, values[common] & 255]
-    return np.stack(flat, axis=1).astype(np.uint8)
+    return np.stack(flat, axis=1).astype(np.uint8), counts[common]
 
 
 def _opacity(
-    colors: UInt8[np.ndarray, "n 3"],
-    flat: UInt8[np.ndarray, "k 3"],
+    colors: UInt8[np.ndarray, "k 3"],
+    counts: Int[np.ndarray, " k"],
     paper: Float[np.ndarray, " 3"],
     tone: UInt8[np.ndarray, " 3"],
 ) -> float:
-    """Return the opacity under which most pixels are one of the flat colours."""
-    tones = colors[:: max(1, len(colors) // MOST_TONES)].astype(np.float32)
+    """Return the opacity under which most pixels have a commoner colour's marked one."""
+    commoner = np.triu(np.ones((len(colors), len(colors)), dtype=bool), 1)
     explained = []
     for opacity in OPACITIES:
-        marked = _marked(flat, paper, tone, float(opacity))
-        near = [np.abs(tones - one).max(axis=1) <= 1 for one in marked.astype(np.float32)]
-        explained.append(int(np.count_nonzero(np.any([np.zeros(len(tones), bool), *near], axis=0))))
+        marked = _marked(colors, paper, tone, float(opacity))
+        near = np.abs(marked[:, None] - colors[None]).max(axis=2) <= NEAR
+        explained.append(int(counts[(near & commoner).any(axis=0)].sum()))
     return float(OPACITIES[int(np.argmax(explained))])
 
 

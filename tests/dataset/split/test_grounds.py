@@ -122,9 +122,9 @@ def test_patterned_paper_is_ground(name: str, quality: int | None) -> None:
 
 
 def test_repeated_figures_are_no_pattern() -> None:
-    """Forty sprites in equal cells repeat, too; nothing larger would be left."""
-    sheet = plain((90, 160, 90), 400, 320)
-    for y in range(0, 320, 40):
+    """Sixty sprites in equal cells repeat, too; nothing larger would be left."""
+    sheet = plain((90, 160, 90), 400, 240)
+    for y in range(0, 240, 40):
         for x in range(0, 400, 40):
             cv2.ellipse(sheet, (x + 20, y + 20), (8, 17), 0, 0, 360, TEAL, -1)
             cv2.ellipse(sheet, (x + 20, y + 10), (7, 8), 0, 0, 360, SKIN, -1)
