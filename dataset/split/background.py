@@ -12,8 +12,10 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
-from toonset.dataset.split.background_field import Field, fit_gradient, fit_smooth, sampled
-from toonset.dataset.split.jpeg_noise import halo_levels, has_jpeg_grid
+from toonset.dataset.images.jpeg_noise import halo_levels, has_jpeg_grid
+from toonset.dataset.split.background_field import Field, fit_gradient, fit_smooth
+from toonset.dataset.split.background_pattern import Plate, fit_pattern
+from toonset.dataset.split.background_zones import fit_steps
 from toonset.errors import SheetError
 from toonset.view import Box, over_white
 
@@ -21,11 +23,16 @@ BINS = 16  # levels per bin of the coarse histogram that finds the dominant colo
 CLUSTER_RADIUS = 32  # levels: border pixels this near to the background are background + noise
 LEAST_TOLERANCE = 2  # levels: a picture without noise still holds rounding
 MOST_TOLERANCE = 48  # levels: beyond it figures would be eaten, whatever the noise
+FAR = 0.1  # of the shorter side from everything drawn: soft edges and glows end nearer
+LEAST_FAR_PX = 8
+COMMON_ALPHA = 0.001  # of what is far: an alpha that is the ground's
+MOST_RESIDUAL = 32  # alpha: more is paint
 TRANSPARENT = 0.01  # of the sheet: less see-through area is an accident, not a background
 STEADY = 1.5  # times the 99th percentile of noise: the 99.99th of a normal distribution
 RIPPLED = 2.0  # the same in JPEG, whose ripples are stronger near figures than in the border
 GRAIN = 2.0  # levels: paper with more has grain all over, beside which no ripples are seen
 RARE = 3.0  # times the 80th percentile of noise: where its 99th may lie
+SURE_ENOUGH = 0.9  # of the border in one colour: less is worth a warning
 LEAST_SURE = 0.3  # of the border: less in one colour is not background
 WORTH = 0.7  # of the simpler background's noise: a richer one must leave less
 WORTH_LEVELS = 2.0  # and less by so many levels
@@ -44,7 +51,7 @@ class Background:
     Attributes:
         rgb: its typical colour; None where the sheet has an alpha channel of its own.
         field: how the colour changes over the sheet; None where it does not.
-        kind: "transparent", "plain", "gradient" or "uneven".
+        kind: "transparent", "plain", "gradient", "uneven", "patterned" or "stepped".
         sure: share of the border that is background, 0 to 1.
         noise: of 99 % of the border, in levels.
         grain: of 80 % of the border, in levels: what is all over the sheet.
@@ -54,7 +61,7 @@ class Background:
     """
 
     rgb: tuple[int, int, int] | None
-    field: Field | None
+    field: Field | Plate | None
     kind: str
     sure: float
     noise: float
@@ -101,7 +108,12 @@ def find_background(
     if known_rgb is not None:
         known = _judged("plain", None, known_rgb, colors, np.array(known_rgb))
         return replace(known, inset=inset)
-    found = replace(_richest_worth_it(rgba, places, colors, inset), inset=inset)
+    found = _pattern(rgba, places, colors) or _richest_worth_it(rgba, places, colors, inset)
+    if found.kind in ("gradient", "uneven") or found.sure < SURE_ENOUGH:
+        steps = _steps(rgba, places, colors, inset)
+        if steps is not None and (found.sure < SURE_ENOUGH or _is_worth_it(steps, found)):
+            found = steps
+    found = replace(found, inset=inset)
     if found.sure < LEAST_SURE:
         raise SheetError(
             f"the background is not one colour (the commonest takes {found.sure:.0%} of the "
@@ -114,6 +126,27 @@ def find_background(
 def is_transparent(rgba: UInt8[np.ndarray, "height width 4"]) -> bool:
     """Return whether the sheet's own alpha tells the figures from the background."""
     return float(np.count_nonzero(rgba[..., 3] < 128)) / rgba[..., 3].size > TRANSPARENT
+
+
+def remove_residual_alpha(
+    rgba: UInt8[np.ndarray, "height width 4"],
+) -> tuple[UInt8[np.ndarray, "height width 4"], int]:
+    """Return a transparent sheet without the alpha that its ground has, and that alpha.
+
+    Layers at 1 %, noise and smears leave a little alpha where nothing is drawn. The ground's alpha
+    is the largest that is common far from what is drawn; the figures are un-mixed from it.
+    """
+    alpha = rgba[..., 3]
+    drawn = (alpha >= 128).view(np.uint8)
+    reach = 2 * round(max(LEAST_FAR_PX, FAR * min(drawn.shape))) + 1
+    far = cv2.dilate(drawn, np.ones((reach, reach), np.uint8)) == 0
+    often = np.bincount(alpha[far], minlength=256) > COMMON_ALPHA * np.count_nonzero(far)
+    level = int(np.flatnonzero(often[: MOST_RESIDUAL + 1]).max(initial=0))
+    if level == 0:
+        return rgba, 0
+    scaled = (np.arange(256) - level) * 255 / (255 - level)
+    table = np.clip(np.rint(scaled), 0, 255).astype(np.uint8)
+    return np.dstack([rgba[..., :3], table[alpha]]), level
 
 
 def flatten(rgba: UInt8[np.ndarray, "height width 4"]) -> UInt8[np.ndarray, "height width 4"]:
@@ -191,6 +224,31 @@ def _samples(ring: Bool[np.ndarray, "height width"]) -> tuple[np.ndarray, np.nda
     return rows[::step], columns[::step]
 
 
+def _pattern(
+    rgba: np.ndarray, places: tuple[np.ndarray, np.ndarray], colors: np.ndarray
+) -> Background | None:
+    """Return the background that repeats, if it does."""
+    plate = fit_pattern(np.ascontiguousarray(rgba[..., :3]), _dominant(colors))
+    return _of_plate("patterned", plate, places, colors)
+
+
+def _steps(
+    rgba: np.ndarray, places: tuple[np.ndarray, np.ndarray], colors: np.ndarray, inset: float
+) -> Background | None:
+    """Return the background of several zones, if the border is in several."""
+    rgb = np.ascontiguousarray(rgba[..., :3])
+    return _of_plate("stepped", fit_steps(rgb, ring_of(*rgb.shape[:2], inset)), places, colors)
+
+
+def _of_plate(
+    kind: str, plate: Plate | None, places: tuple[np.ndarray, np.ndarray], colors: np.ndarray
+) -> Background | None:
+    if plate is None:
+        return None
+    found = _judged(kind, plate, plate.typical, colors, plate.sampled(places))
+    return replace(found, evidence=plate.evidence)
+
+
 def _richest_worth_it(
     rgba: np.ndarray, places: tuple[np.ndarray, np.ndarray], colors: np.ndarray, inset: float
 ) -> Background:
@@ -201,7 +259,7 @@ def _richest_worth_it(
         return best
     gradient = fit_gradient(rgba, inset)
     for kind, field in (("gradient", gradient), ("uneven", fit_smooth(rgba, gradient))):
-        expected = sampled(field, places)
+        expected = field.sampled(places)
         richer = _judged(kind, field, field.typical, colors, expected)
         if not _is_worth_it(richer, best):
             continue
@@ -224,7 +282,7 @@ def _is_worth_it(richer: Background, simpler: Background) -> bool:
 
 def _judged(
     kind: str,
-    field: Field | None,
+    field: Field | Plate | None,
     rgb: tuple[int, int, int],
     colors: UInt8[np.ndarray, "n 3"],
     expected: Float[np.ndarray, "*n 3"],

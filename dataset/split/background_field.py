@@ -20,6 +20,8 @@ ROUNDS = 8  # of fitting and choosing what agrees
 WIDEST_LEVELS = 40.0  # pixels that agree in the first round
 NARROWEST_LEVELS = 8.0  # and in the last
 SMOOTHNESS = 0.06  # of the longest side: width of the smooth field's kernel
+ZONE_SCALES = 5  # widths of a zone's kernels, each half of the last
+ENOUGH = 0.1  # of a kernel: so much of the zone in it tells the colour
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +54,27 @@ class Field:
         share = (u - left)[:, None]
         wide = tall[:, left] * (1 - share) + tall[:, left + 1] * share
         return np.rint(np.clip(wide, 0, 255)).astype(np.uint8)
+
+    def sampled(self, places: tuple[np.ndarray, np.ndarray]) -> Float[np.ndarray, "n 3"]:
+        """Return the field's colours at the pixels (rows, columns) of the sheet."""
+        rows, columns = self.grid.shape[:2]
+        width, height = self.size_wh
+        u = (places[1] + 0.5) * columns / width - 0.5
+        v = (places[0] + 0.5) * rows / height - 0.5
+        source = self.grid.astype(np.float32)
+        maps = [m.astype(np.float32)[None] for m in (u, v)]
+        shorter = 30_000  # OpenCV's remap takes no longer rows
+        parts = [
+            cv2.remap(
+                source,
+                maps[0][:, i : i + shorter],
+                maps[1][:, i : i + shorter],
+                cv2.INTER_LINEAR,
+                borderMode=cv2.BORDER_REPLICATE,
+            )[0]
+            for i in range(0, len(u), shorter)
+        ]
+        return np.concatenate(parts)
 
 
 def fit_gradient(rgba: UInt8[np.ndarray, "height width 4"], inset: float = 0.0) -> Field:
@@ -88,26 +111,22 @@ def fit_smooth(rgba: UInt8[np.ndarray, "height width 4"], start: Field) -> Field
     return Field(field, size_wh)
 
 
-def sampled(field: Field, places: tuple[np.ndarray, np.ndarray]) -> Float[np.ndarray, "n 3"]:
-    """Return the field's colours at the pixels (rows, columns) of the sheet."""
-    rows, columns = field.grid.shape[:2]
-    width, height = field.size_wh
-    u = (places[1] + 0.5) * columns / width - 0.5
-    v = (places[0] + 0.5) * rows / height - 0.5
-    source = field.grid.astype(np.float32)
-    maps = [m.astype(np.float32)[None] for m in (u, v)]
-    shorter = 30_000  # OpenCV's remap takes no longer rows
-    parts = [
-        cv2.remap(
-            source,
-            maps[0][:, i : i + shorter],
-            maps[1][:, i : i + shorter],
-            cv2.INTER_LINEAR,
-            borderMode=cv2.BORDER_REPLICATE,
-        )[0]
-        for i in range(0, len(u), shorter)
-    ]
-    return np.concatenate(parts)
+def fit_zone(
+    rgb: UInt8[np.ndarray, "height width 3"], mask: Bool[np.ndarray, "height width"]
+) -> Field:
+    """Return the smooth field that a part of a picture shows; beyond it, as at its nearest."""
+    small, size_wh = _small(np.dstack([rgb, mask.view(np.uint8)]))
+    cover, _ = _small(np.repeat(255 * mask.view(np.uint8)[..., None], 3, axis=2))
+    known = (cover[..., 0] == 255).astype(np.float32)
+    colors = small.astype(np.float32) * known[..., None]
+    field = np.full_like(colors, colors.sum(axis=(0, 1)) / max(float(known.sum()), 1.0))
+    for halvings in range(ZONE_SCALES):  # the finest that has something to go by
+        sigma = max(small.shape[:2]) / 2 ** (halvings + 1)
+        total = cv2.GaussianBlur(known, (0, 0), sigma)[..., None]
+        mean = cv2.GaussianBlur(colors, (0, 0), sigma) / np.maximum(total, 1e-6)
+        trust = np.clip(total / ENOUGH, 0, 1)
+        field = trust * mean + (1 - trust) * field
+    return Field(field.astype(np.float64), size_wh)
 
 
 def _small(rgba: np.ndarray) -> tuple[Float[np.ndarray, "rows columns 3"], tuple[int, int]]:

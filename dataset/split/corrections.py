@@ -15,7 +15,7 @@ from jaxtyping import Bool, Int, UInt8
 
 from toonset.dataset.split.figures.blobs import Blobs, add_blocks, find_blobs, remove_strangers
 from toonset.dataset.split.figures.rows import Group, find_groups
-from toonset.dataset.split.shadows import find_shadows
+from toonset.dataset.split.figures.shadows import find_shadows
 from toonset.dataset.split.touching.cut import Cut, part_touching
 
 

@@ -13,15 +13,28 @@ from jaxtyping import Bool, UInt8
 from pydantic import Field
 
 from toonset.dataset.silhouettes.line_width import contour_width_px
-from toonset.dataset.split.background import Background, find_background, flatten, is_transparent
+from toonset.dataset.split.background import (
+    Background,
+    find_background,
+    flatten,
+    is_transparent,
+    remove_residual_alpha,
+)
 from toonset.dataset.split.corrections import LIKELIEST, Taken
 from toonset.dataset.split.crop import Crop, boxed_crops, found_crops, grid_crops
 from toonset.dataset.split.figures.blobs import as_box
 from toonset.dataset.split.figures.text_and_swatches import words
 from toonset.dataset.split.holes import BorderLook, open_holes, outline_look
 from toonset.dataset.split.matting import cut_out, edge_softness_px
+from toonset.dataset.split.pages import Pages, find_pages
 from toonset.dataset.split.segment import SheetLayout, find_layout, find_paint
-from toonset.dataset.split.warnings import border_warnings, figure_warnings
+from toonset.dataset.split.warnings import (
+    border_warnings,
+    figure_warnings,
+    mark_warnings,
+    page_warnings,
+)
+from toonset.dataset.split.watermark import find_watermark, remove_watermark
 from toonset.errors import SheetError
 from toonset.palette.palette import Hex
 from toonset.palette.pixels.enlarged import Grid, find_grid
@@ -159,9 +172,19 @@ def split_picture(
     blocks = None if by_hand else find_grid(rgba)
     if blocks is not None:
         return _enlarged(split_picture(blocks.reduced(rgba), options), blocks)
+    pages = find_pages(rgba) if options.background_rgb is None else None
+    if pages is not None:
+        rgba = pages.extended(rgba)
+    residual = 0
     if options.background_rgb is not None or not is_transparent(rgba):
         rgba = flatten(rgba)
+    else:
+        rgba, residual = remove_residual_alpha(rgba)
     ground = find_background(rgba, options.background_rgb)
+    mark = find_watermark(rgba[..., :3], ground.rgb) if ground.kind == "plain" else None
+    if mark is not None:
+        rgba = remove_watermark(rgba, mark)
+        ground = find_background(rgba, options.background_rgb)
     paint, ground = find_paint(rgba, ground)
     found = find_layout(rgba, paint, ground, options.without, options.taken)
     _check(found, ground, options)
@@ -172,9 +195,13 @@ def split_picture(
         tuple(views),
         ground.rgb,
         ground.sure,
-        border_warnings(ground, found) + (() if by_hand else figure_warnings(found, views, rgba)),
+        (*page_warnings(pages), *mark_warnings(mark), *border_warnings(ground, found))
+        + (() if by_hand else figure_warnings(found, views, rgba)),
         () if by_hand else _left_out(found),
-        _remarks(ground, found, holes, 0 if by_hand else len(found.cuts)),
+        (
+            *_of_picture(pages, residual),
+            *_remarks(ground, found, holes, 0 if by_hand else len(found.cuts)),
+        ),
         swatches,
         () if by_hand else _groups(found),
     )
@@ -335,6 +362,14 @@ def _groups(found: SheetLayout) -> tuple[FigureGroup, ...]:
             FigureGroup(boxes, why, group.merit / most, group.outfits, number == found.taken.group)
         )
     return tuple(listed)
+
+
+def _of_picture(pages: Pages | None, residual: int) -> tuple[str, ...]:
+    """Return what was changed before the ground was looked for."""
+    said = [] if pages is None else [f"what lies around {pages} was left out"]
+    if residual:
+        said.append(f"alpha of up to {residual} of 255 was taken for transparent")
+    return tuple(said)
 
 
 def _remarks(ground: Background, found: SheetLayout, holes: int, cuts: int) -> tuple[str, ...]:

@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import UInt8
 
-from toonset.dataset.split.background import Background
+from toonset.dataset.split.background import SURE_ENOUGH, Background
 from toonset.dataset.split.figures.blobs import Blobs, shared_colors
 from toonset.dataset.split.figures.grouping import LEAST_PART
 from toonset.dataset.split.figures.rows import LOWEST
+from toonset.dataset.split.pages import Pages
 from toonset.dataset.split.segment import SheetLayout
+from toonset.dataset.split.watermark import Watermark
 from toonset.view import View
 
-SURE_ENOUGH = 0.9  # of the border in one colour: less is worth a warning
 NEARLY_A_VIEW = 0.5  # of the views' height: something left out that may be a small one
 PROPORTIONS = 1.2  # times the widest view's, or less than its inverse of the narrowest's: no view
 ALIKE = 0.6  # of the colours that the views share among each other: less is another thing
@@ -21,6 +22,26 @@ NEARER = 1.2  # times the gap between parts and their bodies: so near a part may
 AS_LIKELY = 0.6  # of the merit of the group that was taken: another may be the turnaround
 WHOLE = 0.6  # of the sheet that one view's box covers though there is text beside it
 WIDE = 1.8  # times the median width: two figures that touch
+
+
+def page_warnings(pages: Pages | None) -> tuple[str, ...]:
+    """Return a line if the paper lies at an angle: the drawings are cut as they are seen."""
+    if pages is None or pages.upright:
+        return ()
+    return (
+        "the paper does not fill the picture and lies at an angle: straighten it and crop it to "
+        "the paper for true proportions",
+    )
+
+
+def mark_warnings(mark: Watermark | None) -> tuple[str, ...]:
+    """Return a line if a watermark lies over the figures: their colours may keep some of it."""
+    if mark is None:
+        return ()
+    return (
+        "a watermark lies over the sheet; it was taken off the paper and flat colours: look at the "
+        "figures, or use a picture without it",
+    )
 
 
 def border_warnings(ground: Background, found: SheetLayout) -> tuple[str, ...]:

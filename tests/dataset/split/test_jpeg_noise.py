@@ -7,8 +7,8 @@ import pytest
 from PIL import Image
 
 from bench.messy.sheet import make_messy_sheet
+from toonset.dataset.images.jpeg_noise import has_jpeg_grid
 from toonset.dataset.split.background import difference, find_background, with_final_tolerance
-from toonset.dataset.split.jpeg_noise import has_jpeg_grid
 
 WHITE = np.full((1, 1, 3), 255, np.uint8)
 

@@ -1,0 +1,176 @@
+"""Find the page in pictures that show more: art boards, viewers, cards, paper on a desk.
+
+A page is a smooth zone in another colour than the picture's own ground, whose outline is a
+rectangle, upright or seen at an angle, and on which most of what is drawn stands. What lies around
+it is not of the sheet and shows the page's nearest paper instead, so places stay as they are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Int, UInt8
+
+from toonset.dataset.split.background import ring_of
+from toonset.dataset.split.background_zones import LEAST_ZONE, find_zones, shrunk
+from toonset.raster import dilate
+
+LONGEST_PX = 800  # of the copy in which pages are looked for
+LEAST_PAGE = 0.03  # of the picture
+LEAST_PIECE = 0.005  # of the picture: ruled lines part a page into pieces
+SAME_PAPER = 32  # levels between the pieces of a page
+LINE = 4  # cells: ruled lines are no thicker
+APART = 10  # levels between page and ground: a frame on the same paper is no page
+RECTANGLE = 0.9  # of the smallest rectangle round it: paper seen at an angle fills less of it
+PLAIN_RIM = 0.85  # of the page's outline that its own colour takes
+CELLS = 3  # that a zone ends before its edge
+THING = 0.12  # of the page's height: a drawing is no lower
+ALONE = 0.6  # of the page's height: one such drawing is enough
+AS_TALL = 0.6  # of the tallest drawing on the pages: what stands beside them counts, too
+STRIP = 0.12  # of the same: narrower things beside them are edges and shadows
+UPRIGHT_DEG = 0.5
+UPRIGHT = 0.97  # of the smallest rectangle: less is a perspective
+
+
+@dataclass(frozen=True, eq=False)
+class Pages:
+    """The pages of a picture.
+
+    Attributes:
+        mask: (height, width) pixels inside of their edges.
+        paper: of these, where nothing is drawn.
+        count: how many there are.
+        upright: their edges are the picture's rows and columns.
+    """
+
+    mask: Bool[np.ndarray, "height width"]
+    paper: Bool[np.ndarray, "height width"]
+    count: int
+    upright: bool
+
+    def extended(
+        self, rgba: UInt8[np.ndarray, "height width 4"]
+    ) -> UInt8[np.ndarray, "height width 4"]:
+        """Return the picture with the nearest paper in place of what lies around the pages."""
+        _, nearest = cv2.distanceTransformWithLabels(
+            (~self.paper).view(np.uint8), cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL
+        )
+        colors = np.zeros((int(nearest.max()) + 1, 4), dtype=np.uint8)
+        colors[nearest[self.paper]] = rgba[self.paper]
+        return np.where(self.mask[..., None], rgba, colors[nearest])
+
+    def __str__(self) -> str:
+        """Return where they are, for people."""
+        x, y, width, height = cv2.boundingRect(self.mask.view(np.uint8))
+        what = "one page" if self.count == 1 else f"{self.count} pages"
+        return f"{what} within {width} x {height} px at {x}, {y}"
+
+
+@dataclass(frozen=True, eq=False)
+class _Page:
+    """One page, in cells: what it covers, its paper, its tallest drawing, whether it is upright."""
+
+    mask: Bool[np.ndarray, "rows columns"]
+    paper: Bool[np.ndarray, "rows columns"]
+    tallest: int
+    upright: bool
+
+
+def find_pages(rgba: UInt8[np.ndarray, "height width 4"]) -> Pages | None:
+    """Return the pages on which a picture's figures are drawn; None if it is a page itself."""
+    small, shrink = shrunk(rgba, LONGEST_PX)
+    clear, ring = small[..., 3] < 128, ring_of(*small.shape[:2])
+    rgb = _opaque(small, clear)
+    labels = find_zones(rgb, shrink, LEAST_PIECE).labels
+    areas = np.bincount(labels.ravel())
+    at_border = np.bincount(labels[ring], minlength=len(areas)) >= LEAST_ZONE * ring.sum()
+    see_through = np.bincount(labels[clear], minlength=len(areas)) > 0.5 * areas
+    outer = see_through if clear.any() else at_border
+    outer[0] = False
+    large = np.flatnonzero((areas >= LEAST_PAGE * labels.size) & ~outer)
+    found = [_page(_sheet(int(n), labels, outer, rgb)) for n in large[large > 0]]
+    pages = [page for page in found if page is not None]
+    pages = [page for page in pages if not any(_is_in(page, other) for other in pages)]
+    if not pages or not _hold_all(pages, outer[labels]):
+        return None
+    mask, paper = (
+        cv2.resize(np.any(cells, axis=0).view(np.uint8), rgba.shape[1::-1], interpolation=0) > 0
+        for cells in ([page.mask for page in pages], [page.paper for page in pages])
+    )
+    return Pages(mask, paper, len(pages), all(page.upright for page in pages))
+
+
+def _opaque(rgba: np.ndarray, clear: np.ndarray) -> UInt8[np.ndarray, "rows columns 3"]:
+    """Return the picture with what is clear in a colour far from what is not."""
+    if not clear.any():
+        return np.ascontiguousarray(rgba[..., :3])
+    usual = np.zeros(3) if clear.all() else np.median(rgba[~clear][:, :3], axis=0)
+    far = np.where(usual < 128, 255, 0).astype(np.uint8)
+    return np.where(clear[..., None], far, rgba[..., :3])
+
+
+def _sheet(
+    number: int, labels: np.ndarray, outer: np.ndarray, rgb: np.ndarray
+) -> Bool[np.ndarray, "rows columns"]:
+    """Return a zone with the pieces that ruled lines part from it; empty if it is as the ground."""
+    own = labels == number
+    color = np.median(rgb[own], axis=0)
+
+    def away(other: int) -> float:
+        return float(np.abs(color - np.median(rgb[labels == other], axis=0)).max())
+
+    if any(away(int(ground)) < APART for ground in np.flatnonzero(outer)):
+        return np.zeros_like(own)
+    beside = np.unique(labels[dilate(own, LINE)])
+    pieces = beside[(beside > 0) & (beside != number) & ~outer[beside]]
+    alike = [int(piece) for piece in pieces if away(int(piece)) <= SAME_PAPER]
+    return np.isin(labels, [number, *alike])
+
+
+def _page(own: Bool[np.ndarray, "rows columns"]) -> _Page | None:
+    """Return what a zone's outline holds, if that is a page."""
+    outlines, _ = cv2.findContours(own.view(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    if not outlines:
+        return None
+    hull = cv2.convexHull(np.concatenate(outlines))
+    _, (width, height), angle = cv2.minAreaRect(hull)
+    filled = cv2.contourArea(hull) / max(width * height, 1)
+    mask, rim = np.zeros(own.shape, np.uint8), np.zeros(own.shape, np.uint8)
+    cv2.drawContours(mask, [hull], -1, 1, cv2.FILLED)
+    cv2.drawContours(rim, [hull], -1, 1, 1)
+    if filled < RECTANGLE or dilate(own, CELLS)[rim > 0].mean() < PLAIN_RIM:
+        return None
+    tall = int(cv2.boundingRect(mask)[3])
+    heights = _heights((mask > 0) & ~own)
+    tallest = int(heights.max(initial=0))
+    if (heights >= THING * tall).sum() < 2 and tallest < ALONE * tall:
+        return None
+    tilt = abs((angle + 45) % 90 - 45)
+    return _Page(mask > 0, own, tallest, tilt <= UPRIGHT_DEG and filled >= UPRIGHT)
+
+
+def _heights(mask: Bool[np.ndarray, "rows columns"]) -> Int[np.ndarray, " things"]:
+    """Return the heights of connected patches, but those at the border."""
+    _, _, stats, _ = cv2.connectedComponentsWithStats(mask.view(np.uint8), connectivity=8)
+    x, y, width, height = stats[1:, :4].T
+    inside = (x > 0) & (y > 0) & (x + width < mask.shape[1]) & (y + height < mask.shape[0])
+    return np.asarray(height[inside], dtype=np.int64)
+
+
+def _is_in(page: _Page, other: _Page) -> bool:
+    """Return whether a page lies on a larger one."""
+    shared = np.count_nonzero(page.mask & other.mask)
+    smaller = page.mask.sum() < other.mask.sum()
+    return page is not other and bool(smaller and shared > 0.5 * page.mask.sum())
+
+
+def _hold_all(pages: list[_Page], ground: Bool[np.ndarray, "rows columns"]) -> bool:
+    """Return whether nothing as tall as the pages' drawings stands beside them."""
+    tallest = max(page.tallest for page in pages)
+    around = dilate(np.any([page.mask for page in pages], axis=0), 2 * CELLS)
+    width = max(3, round(STRIP * tallest))
+    beside = (~ground & ~around).view(np.uint8)
+    thick = cv2.morphologyEx(beside, cv2.MORPH_OPEN, np.ones((width, width), np.uint8)) > 0
+    return int(_heights(thick).max(initial=0)) < AS_TALL * tallest

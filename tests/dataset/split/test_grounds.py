@@ -1,0 +1,294 @@
+"""Grounds that are no plain paper: pages in a picture, patterns, steps, faint alpha, watermarks."""
+
+import io
+from collections.abc import Callable
+
+import cv2
+import numpy as np
+import pytest
+from PIL import Image
+
+from toonset.dataset.split.background import remove_residual_alpha
+from toonset.dataset.split.background_zones import find_zones
+from toonset.dataset.split.pages import find_pages
+from toonset.dataset.split.sheet import Segmentation, split_picture
+
+WIDTH, HEIGHT, FIGURES = 800, 260, 4
+BLACK, TEAL, SKIN, BROWN = (10, 10, 10), (38, 138, 140), (250, 205, 165), (124, 72, 48)
+ROWS, COLUMNS = np.mgrid[:HEIGHT, :WIDTH]
+
+Picture = np.ndarray
+
+
+def plain(color: int | tuple[int, int, int], width: int = WIDTH, height: int = HEIGHT) -> Picture:
+    return np.full((height, width, 3), color, np.uint8)
+
+
+def figures(ground: Picture) -> tuple[Picture, np.ndarray]:
+    """Return a picture with four outlined figures on it, and their mask."""
+    picture, mask = ground.copy(), np.zeros(ground.shape[:2], np.uint8)
+    parts = (((-8, 190), (14, 48), BROWN), ((0, 130), (30, 60), TEAL), ((0, 60), (26, 30), SKIN))
+    for k in range(FIGURES):
+        for target, grow in ((picture, 0), (mask, 0)):
+            for (x, y), (a, b), color in parts:
+                center, axes = (100 + 200 * k + x, y), (a + grow, b + grow)
+                paint = color if target is picture else 1
+                edge = BLACK if target is picture else 1
+                cv2.ellipse(target, center, axes, 0, 0, 360, paint, -1)
+                cv2.ellipse(target, center, axes, 0, 0, 360, edge, 3)
+    return picture, mask > 0
+
+
+def jpeg(rgb: Picture, quality: int = 80) -> Picture:
+    data = io.BytesIO()
+    Image.fromarray(rgb).save(data, "JPEG", quality=quality)
+    return np.asarray(Image.open(data).convert("RGB"))
+
+
+def opaque(rgb: Picture) -> Picture:
+    return np.dstack([rgb, np.full(rgb.shape[:2], 255, np.uint8)])
+
+
+def overlap(found: Segmentation, truth: np.ndarray) -> float:
+    """Return intersection over union of the views' pixels, where they lie in the sheet."""
+    mask = np.zeros(truth.shape, bool)
+    for view in found.views:
+        x, y, width, height = view.box
+        mask[y : y + height, x : x + width] |= view.mask
+    return float((mask & truth).sum() / (mask | truth).sum())
+
+
+def assert_right(rgba: Picture, truth: np.ndarray) -> Segmentation:
+    found = split_picture(rgba)
+    assert len(found.views) == FIGURES
+    assert overlap(found, truth) >= 0.95
+    return found
+
+
+def graph(period: int, paper: tuple[int, int, int], line: tuple[int, int, int]) -> Picture:
+    ground = plain(paper)
+    ground[((ROWS + 3) % period < 1) | ((COLUMNS + 5) % period < 1)] = line
+    return ground
+
+
+def dots(period: int, radius: int) -> Picture:
+    ground = plain(255)
+    for y in range(0, HEIGHT + period, period):
+        for x in range(0, WIDTH + period, period):
+            cv2.circle(ground, (x, y), radius, (255, 205, 215), -1, cv2.LINE_AA)
+    return ground
+
+
+def checks(side: float, dark: int = 204, light: int = 255) -> Picture:
+    odd = (np.floor(ROWS / side) + np.floor(COLUMNS / side)) % 2 > 0
+    return np.repeat(np.where(odd, dark, light).astype(np.uint8)[..., None], 3, axis=2)
+
+
+def turned_graph() -> Picture:
+    wide = np.full((800, 1200, 3), 255, np.uint8)
+    rows, columns = np.mgrid[:800, :1200]
+    wide[(rows % 22 < 2) | (columns % 22 < 2)] = (170, 200, 225)
+    matrix = cv2.getRotationMatrix2D((600, 400), 3, 1)
+    return np.asarray(cv2.warpAffine(wide, matrix, (1200, 800))[200:460, 200:1000])
+
+
+PATTERNS: dict[str, Callable[[], Picture]] = {
+    "graph": lambda: graph(20, (252, 252, 250), (190, 215, 240)),
+    "fine graph": lambda: graph(7, (255, 255, 255), (200, 220, 240)),
+    "faint graph": lambda: graph(12, (255, 255, 255), (244, 244, 244)),
+    "blueprint": lambda: graph(24, (30, 80, 140), (100, 140, 190)),
+    "turned graph": turned_graph,
+    "dots": lambda: dots(15, 1),
+    "polka": lambda: dots(24, 5),
+    "diamonds": lambda: np.where(
+        (((ROWS + COLUMNS) % 28 < 1) | ((ROWS - COLUMNS) % 28 < 1))[..., None],
+        np.uint8((180, 200, 220)),
+        plain(255),
+    ),
+    "checks": lambda: checks(8),
+    "dark checks": lambda: checks(12, 0x66, 0x99),
+    "resized checks": lambda: checks(7.5),
+}
+
+
+@pytest.mark.parametrize("name", PATTERNS)
+@pytest.mark.parametrize("quality", [None, 80])
+def test_patterned_paper_is_ground(name: str, quality: int | None) -> None:
+    picture, truth = figures(PATTERNS[name]())
+    picture = picture if quality is None else jpeg(picture, quality)
+    found = assert_right(opaque(picture), truth)
+    assert any("patterned" in remark for remark in found.remarks)
+    assert not found.warnings
+
+
+def test_repeated_figures_are_no_pattern() -> None:
+    """Sixty sprites in equal cells repeat, too; nothing larger would be left."""
+    sheet = plain((90, 160, 90), 400, 240)
+    for y in range(0, 240, 40):
+        for x in range(0, 400, 40):
+            cv2.ellipse(sheet, (x + 20, y + 20), (8, 17), 0, 0, 360, TEAL, -1)
+            cv2.ellipse(sheet, (x + 20, y + 10), (7, 8), 0, 0, 360, SKIN, -1)
+    found = split_picture(opaque(sheet))
+    assert not any("patterned" in remark for remark in found.remarks)
+
+
+def sky_and_floor() -> Picture:
+    top = np.linspace(0, 1, HEIGHT)[:, None, None]
+    ground = (np.array([150, 195, 250]) * (1 - top) + np.array([235, 245, 255]) * top) + 0 * plain(
+        0
+    )
+    ground[205:] = (170, 150, 120)
+    return ground.astype(np.uint8)
+
+
+STEPS: dict[str, Callable[[], Picture]] = {
+    "horizon": lambda: np.where((ROWS > 180)[..., None], np.uint8((200, 180, 150)), plain(250)),
+    "sloping horizon": lambda: np.where(
+        (ROWS > 170 + 0.03 * COLUMNS)[..., None], np.uint8((200, 180, 150)), plain(250)
+    ),
+    "soft horizon": lambda: cv2.GaussianBlur(
+        np.where((ROWS > 215)[..., None], np.uint8((110, 160, 100)), plain(255)), (0, 0), 2
+    ),
+    "halves": lambda: np.where((COLUMNS > 400)[..., None], np.uint8((70, 60, 60)), plain(255)),
+    "three panels": lambda: np.where(
+        (COLUMNS > 533)[..., None],
+        np.uint8((230, 215, 200)),
+        np.where((COLUMNS > 266)[..., None], np.uint8((200, 220, 230)), plain(255)),
+    ),
+    "sky": sky_and_floor,
+    "scanner's edge": lambda: np.where((COLUMNS > 786)[..., None], np.uint8(40), plain(248)),
+}
+
+
+@pytest.mark.parametrize("name", STEPS)
+@pytest.mark.parametrize("quality", [None, 85])
+def test_grounds_with_steps(name: str, quality: int | None) -> None:
+    picture, truth = figures(STEPS[name]())
+    found = assert_right(opaque(picture if quality is None else jpeg(picture, quality)), truth)
+    assert any("stepped" in remark for remark in found.remarks)
+
+
+def on_board(
+    board: tuple[int, int, int], paper: int = 255, side: int = 40
+) -> tuple[Picture, Picture]:
+    """Return a page with figures on a board, and their mask."""
+    page, mask = figures(plain(paper))
+    picture = plain(board, WIDTH + 2 * side, HEIGHT + 2 * side)
+    truth = np.zeros(picture.shape[:2], bool)
+    inside = slice(side, side + HEIGHT), slice(side, side + WIDTH)
+    picture[inside], truth[inside] = page, mask
+    return picture, truth
+
+
+@pytest.mark.parametrize("board", [(83, 83, 83), (229, 229, 229), (240, 240, 244), (20, 40, 60)])
+@pytest.mark.parametrize("side", [10, 40])
+def test_page_on_a_board(board: tuple[int, int, int], side: int) -> None:
+    picture, truth = on_board(board, side=side)
+    found = assert_right(opaque(picture), truth)
+    assert any("around one page" in remark for remark in found.remarks)
+    assert not found.warnings
+
+
+def test_page_among_toolbars_with_an_outline_and_a_shadow() -> None:
+    picture, truth = on_board((240, 240, 240), side=60)
+    cv2.rectangle(picture, (0, 0), (picture.shape[1], 30), (60, 60, 60), -1)
+    for k in range(8):
+        cv2.rectangle(picture, (8, 60 + 30 * k), (28, 80 + 30 * k), (150, 150, 150), -1)
+    picture[60 + HEIGHT : 68 + HEIGHT, 68 : 68 + WIDTH] = 190
+    picture[68 : 68 + HEIGHT, 60 + WIDTH : 68 + WIDTH] = 190
+    assert_right(opaque(picture), truth)
+
+
+@pytest.mark.parametrize("cards", [1, FIGURES])
+@pytest.mark.parametrize("paper", [(255, 255, 255), (250, 240, 230)])
+def test_cards_on_transparency(cards: int, paper: tuple[int, int, int]) -> None:
+    picture, truth = figures(plain(paper))
+    alpha = np.zeros(truth.shape, np.uint8)
+    for k in range(cards):
+        left, right = k * WIDTH // cards + 8, (k + 1) * WIDTH // cards - 8
+        cv2.rectangle(alpha, (left, 6), (right, HEIGHT - 6), 255, -1)
+    found = assert_right(np.dstack([picture, alpha]), truth)
+    assert found.background == paper
+
+
+def test_paper_on_a_desk_is_cut_and_told() -> None:
+    page, mask = figures(plain(245))
+    corners = np.array([[0, 0], [WIDTH, 0], [WIDTH, HEIGHT], [0, HEIGHT]], np.float32)
+    seen = np.array([[40, 40], [850, 60], [830, 350], [25, 330]], np.float32)
+    matrix = cv2.getPerspectiveTransform(corners, seen)
+    photo, cover = (
+        cv2.warpPerspective(page, matrix, (900, 400)),
+        cv2.warpPerspective(np.full(mask.shape, 255, np.uint8), matrix, (900, 400)),
+    )
+    truth = cv2.warpPerspective(mask.view(np.uint8), matrix, (900, 400)) > 0
+    photo = np.where(cover[..., None] > 127, photo, np.uint8((100, 70, 50)))
+    found = assert_right(opaque(jpeg(photo, 90)), truth)
+    assert any("lies at an angle" in line for line in found.warnings)
+
+
+def test_a_panel_beside_the_figures_is_no_page() -> None:
+    picture, _ = figures(plain(255))
+    picture = np.vstack([picture, plain(255, height=160)])
+    cv2.rectangle(picture, (300, 280), (500, 400), (200, 220, 250), -1)
+    for x in (350, 450):
+        cv2.circle(picture, (x, 340), 30, SKIN, -1)
+    assert find_pages(opaque(picture)) is None
+
+
+def test_a_sheet_is_no_page_of_itself() -> None:
+    assert find_pages(opaque(figures(plain(255))[0])) is None
+
+
+ALPHAS: dict[str, np.ndarray] = {
+    "one": np.full((HEIGHT, WIDTH), 1),
+    "twenty": np.full((HEIGHT, WIDTH), 20),
+    "noise": np.random.default_rng(1).integers(0, 4, (HEIGHT, WIDTH)),
+    "smear": np.where(np.abs(ROWS - 130) < 30, 6, 0),
+    "ramp": COLUMNS * 20 // WIDTH,
+}
+
+
+@pytest.mark.parametrize("name", ALPHAS)
+def test_residual_alpha_is_ground(name: str) -> None:
+    picture, truth = figures(plain(0))
+    alpha = np.where(truth, 255, ALPHAS[name]).astype(np.uint8)
+    found = assert_right(np.dstack([picture, alpha]), truth)
+    assert not found.warnings
+    assert any("taken for transparent" in remark for remark in found.remarks)
+
+
+def test_soft_edges_and_glows_keep_their_alpha() -> None:
+    picture, truth = figures(plain(0))
+    glow = cv2.GaussianBlur(truth.astype(np.float32), (0, 0), 5)
+    rgba = np.dstack([picture, np.where(truth, 255, 120 * glow).astype(np.uint8)])
+    cleaned, level = remove_residual_alpha(rgba)
+    assert level == 0
+    assert cleaned is rgba
+
+
+@pytest.mark.parametrize(("color", "opacity"), [((0, 0, 0), 0.15), ((120, 120, 120), 0.25)])
+def test_a_watermark_is_taken_off_and_told(color: tuple[int, int, int], opacity: float) -> None:
+    picture, truth = figures(plain(255))
+    letters = np.zeros((1000, 1400), np.uint8)
+    for j, y in enumerate(range(30, 1000, 70)):
+        for x in range(-60 * (j % 3), 1400, 200):
+            cv2.putText(letters, "SAMPLE", (x, y), 0, 1, 255, 2, cv2.LINE_AA)
+    turn = cv2.getRotationMatrix2D((700, 500), 20, 1)
+    turned = cv2.warpAffine(letters, turn, (1400, 1000))[370 : 370 + HEIGHT, 300 : 300 + WIDTH]
+    share = opacity * turned[..., None] / 255
+    marked = (picture * (1 - share) + np.array(color) * share).astype(np.uint8)
+    found = assert_right(opaque(marked), truth)
+    assert any("watermark" in line for line in found.warnings)
+    for view in found.views:
+        x, y, width, height = view.box
+        clean = picture[y : y + height, x : x + width].astype(int)
+        off = np.abs(view.rgba[..., :3] - clean).max(axis=2)[view.mask]
+        assert np.mean(off > 12) < 0.03  # letters cover about a sixth
+
+
+def test_zones_end_at_edges() -> None:
+    picture = plain(200, 60, 40)
+    picture[:, 30:] = 100
+    zones = find_zones(picture, 1.0, 0.1)
+    assert zones.count == 2
+    assert zones.labels[20, 5] != zones.labels[20, 55]
