@@ -19,6 +19,7 @@ from toonset.dataset.split.figures.blobs import (
     find_main_blobs,
     remove_strangers,
 )
+from toonset.dataset.split.open_outlines import Gap, close_outlines
 from toonset.dataset.split.shadows import find_shadows
 from toonset.dataset.split.touching.cut import Cut, part_touching
 
@@ -39,6 +40,8 @@ class SheetState:
         blobs: patches of figures and other things.
         bodies: numbers of the patches that are bodies of views; None: as `find_main_blobs` says.
         cuts: where touching figures were cut apart.
+        filled: cells of background within outlines that are open.
+        gaps: where those are open.
     """
 
     rgba: UInt8[np.ndarray, "rows columns 4"]
@@ -52,6 +55,8 @@ class SheetState:
     blobs: Blobs
     bodies: Int[np.ndarray, " bodies"] | None = None
     cuts: tuple[Cut, ...] = ()
+    filled: Bool[np.ndarray, "rows columns"] | None = None
+    gaps: tuple[Gap, ...] = ()
 
     @classmethod
     def first(
@@ -75,6 +80,15 @@ class SheetState:
         return find_main_blobs(self.blobs) if self.bodies is None else self.bodies
 
 
+def fill_open_outlines(state: SheetState) -> SheetState | None:
+    """Propose figures whose outlines have gaps, with their insides."""
+    filled, gaps = close_outlines(state.painted & ~state.ruled, state.paper, state.ring)
+    if not gaps:
+        return None
+    paper = joined((~state.painted | state.ruled) & ~filled, state.ring)
+    return replace(state, filled=filled, gaps=gaps, paper=paper, blobs=find_blobs(~paper))
+
+
 def remove_shadows(state: SheetState) -> SheetState | None:
     """Propose figures without the shadows that they cast."""
     if not len(state.main_blobs):  # specks alone cast none
@@ -83,7 +97,8 @@ def remove_shadows(state: SheetState) -> SheetState | None:
     shadow = find_shadows(state.blobs, state.main_blobs, *seen)
     if not shadow.any():
         return None
-    paper = joined(~state.painted | state.ruled | shadow, state.ring)
+    free = ~state.painted | state.ruled | shadow
+    paper = joined(free if state.filled is None else free & ~state.filled, state.ring)
     return replace(state, shadow=shadow, paper=paper, blobs=find_blobs(~paper))
 
 
@@ -107,6 +122,7 @@ def drop_strangers(state: SheetState) -> SheetState | None:
 
 
 CORRECTIONS: Mapping[str, Callable[[SheetState], SheetState | None]] = {
+    "open outlines": fill_open_outlines,
     "shadows": remove_shadows,
     "touching figures": cut_touching_figures,
     "blocky figures": add_blocky_figures,

@@ -114,7 +114,10 @@ def _crop(
         own = _own_pixels(cells, number, found.cell_px, box)
     paper = in_pixels(found.paper, found.cell_px, box)
     if found.cell_px > 1:
-        paper = joined(~drawn, paper & ~drawn)
+        free = ~drawn
+        if found.filled is not None:
+            free &= ~in_pixels(found.filled, found.cell_px, box)
+        paper = joined(free, paper & free)
     solid = own & ~paper & ~in_pixels(found.shadow, found.cell_px, box)
     return Crop(box, solid, solid & ~drawn)
 

@@ -17,6 +17,7 @@ from toonset.dataset.split.background import Background, difference, ring_of, wi
 from toonset.dataset.split.corrections import CORRECTIONS, SheetState
 from toonset.dataset.split.figures.blobs import Blobs
 from toonset.dataset.split.figures.grouping import Grouping, group_blobs
+from toonset.dataset.split.open_outlines import Gap
 from toonset.dataset.split.ruled_lines import Line, find_lines, line_pixels
 from toonset.dataset.split.touching.cut import Cut
 from toonset.errors import SheetError
@@ -40,6 +41,8 @@ class SheetLayout:
         blobs: patches of figures and other things.
         grouping: which patch is whose.
         cuts: where touching figures were cut apart.
+        filled: (rows, columns) cells of background within outlines that are open; None: of none.
+        gaps: where those are open.
     """
 
     cell_px: int
@@ -50,6 +53,8 @@ class SheetLayout:
     blobs: Blobs
     grouping: Grouping
     cuts: tuple[Cut, ...]
+    filled: Bool[np.ndarray, "rows columns"] | None
+    gaps: tuple[Gap, ...]
 
 
 def find_paint(
@@ -101,7 +106,7 @@ def find_layout(
     grouping = group_blobs(state.blobs, state.main_blobs, state.rgba[..., :3])
     return SheetLayout(
         *(cell, state.paper, state.shadow, state.ruled, tuple(lines)),
-        *(state.blobs, grouping, state.cuts),
+        *(state.blobs, grouping, state.cuts, state.filled, state.gaps),
     )
 
 

@@ -1,0 +1,192 @@
+"""Close outlines that are nearly closed: line art with gaps, broken pencil lines.
+
+The background is flooded from outside with a ball that does not fit through gaps (trapped-ball
+segmentation, Zhang et al. 2009, "Vectorizing cartoon animations"). What only a smaller ball
+reaches is a pocket: the inside of an open outline, or the gap between legs, between arm and body.
+They are told apart by their walls. Behind the line around a figure lies the outside again; behind
+an arm or a leg, painted or closed, it does not. Each pocket is cut off by the smallest ball that
+does not enter it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from toonset.dataset.split.figures.blobs import find_blobs, find_main_blobs
+from toonset.raster import dilate, sized_parts
+
+SEEN_AT = 280  # cells of a figure's height: outlines of larger figures are closed on coarser ones
+LARGEST = 0.05  # of the figure's height: half of the widest gap that is closed
+WALL = 0.03  # of the figure's height, and two cells: no line is thicker
+LEAST_POCKET = 0.002  # of the figure's squared height: smaller pockets are corners of the outline
+LEAST_FACING = 0.15  # of a pocket's walls: lines with the outside behind them
+LEAST_FACING_LENGTH = 0.06  # of the figure's height: the same
+JOIN = 0.012  # of the figure's height: across gaps so wide lines are of one figure
+STEP = 1.2  # times the ball before: the next
+
+Mask = Bool[np.ndarray, "rows columns"]
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Gap of an outline that was closed.
+
+    Attributes:
+        x: of its middle, in cells of the sheet.
+        y: of its middle, in cells of the sheet.
+        width: in cells.
+        area: of the pocket that was open there, in cells.
+        height: of the sheet's figures, in cells.
+    """
+
+    x: int
+    y: int
+    width: float
+    area: int
+    height: float
+
+
+def close_outlines(walls: Mask, paper: Mask, ring: Mask) -> tuple[Mask, tuple[Gap, ...]]:
+    """Return the background within nearly closed outlines, and where they are open.
+
+    Args:
+        walls: what is drawn.
+        paper: background that the outside reaches.
+        ring: cells at the border, where the outside begins.
+    """
+    height = _figure_height(~paper)
+    step = max(1, round(height / SEEN_AT))
+    drawn = _pooled(walls, step)
+    outside = _pooled(paper, step) & ~drawn
+    pockets, gaps = _close(drawn, outside, _pooled(ring, step) & outside, height / step)
+    if not gaps:
+        return np.zeros_like(walls), ()
+    rows, columns = (np.arange(size) // step for size in walls.shape)
+    filled = pockets[rows[:, None], columns] & paper
+    for _ in range(step if step > 1 else 0):  # up to the lines, which coarse cells contain
+        filled = cv2.dilate(filled.view(np.uint8), _CROSS).view(np.bool_) & paper
+    scaled = [
+        Gap(
+            *(step * gap.x + step // 2, step * gap.y + step // 2, step * gap.width),
+            *(step * step * gap.area, height),
+        )
+        for gap in gaps
+    ]
+    return filled, tuple(scaled)
+
+
+_CROSS = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
+
+
+def _figure_height(solid: Mask) -> float:
+    """Return how high the figures are, whose lines may be in pieces."""
+    reach = max(1, round(JOIN / 3 * min(solid.shape)))
+    height = 0.0
+    for _ in range(3):
+        blobs = find_blobs(dilate(solid, reach))
+        bodies = find_main_blobs(blobs)
+        height = float(np.median(blobs.boxes[bodies, 3])) - 2 * reach if len(bodies) else 0.0
+        if round(JOIN * height) <= reach:
+            break
+        reach = round(JOIN * height)
+    return height
+
+
+def _pooled(mask: Mask, step: int) -> Mask:
+    """Return which coarse cells hold any of a mask."""
+    below, beside = -mask.shape[0] % step, -mask.shape[1] % step
+    whole = np.pad(mask, ((0, below), (0, beside)))
+    size = whole.shape[0] // step, step, whole.shape[1] // step, step
+    return np.asarray(whole.reshape(size).any(axis=(1, 3)))
+
+
+def _close(drawn: Mask, outside: Mask, seeds: Mask, height: float) -> tuple[Mask, list[Gap]]:
+    pockets, gaps = np.zeros_like(drawn), list[Gap]()
+    room = _distance(drawn)
+    reached = _reached(room, outside, seeds, LARGEST * height)
+    numbers, areas = sized_parts(outside & ~reached, connectivity=4)
+    facing = _facing(numbers, len(areas), drawn, reached, height)
+    for number in range(1, len(areas)):
+        if areas[number] < LEAST_POCKET * height**2 or not _is_inside(*facing[number], height):
+            continue
+        window = _around(numbers == number, round(WALL * height) + 4)
+        found = _smallest(
+            *(numbers[window] == number, drawn[window], reached[window], room[window], height)
+        )
+        y, x = window[0].start, window[1].start
+        for pocket, gap in found:
+            pockets[window] |= pocket
+            gaps.append(Gap(gap.x + x, gap.y + y, gap.width, gap.area, height))
+    return pockets, gaps
+
+
+def _smallest(
+    pocket: Mask, drawn: Mask, reached: Mask, room: Float[np.ndarray, "rows columns"], height: float
+) -> list[tuple[Mask, Gap]]:
+    """Return the parts of a pocket, each cut off by the smallest ball that does not enter it."""
+    found, left, ball = list[tuple[Mask, Gap]](), pocket, 1.0
+    while ball < LARGEST * height * STEP and left.any():
+        within = _reached(room, left | reached, reached, min(ball, LARGEST * height))
+        numbers, areas = sized_parts(left & ~within, connectivity=4)
+        facing = _facing(numbers, len(areas), drawn, within, height)
+        for number in range(1, len(areas)):
+            part = numbers == number
+            large = areas[number] >= LEAST_POCKET * height**2 and (room[part] > ball).any()
+            if large and _is_inside(*facing[number], height):
+                found.append((part, _gap(part, within, 2 * ball - 1, height)))
+                left = left & ~part
+        room = np.where(left | reached, room, 0)
+        ball *= STEP
+    return found
+
+
+def _gap(part: Mask, outside: Mask, width: float, height: float) -> Gap:
+    rows, columns = np.nonzero(part & dilate(outside))
+    if not len(rows):
+        rows, columns = np.nonzero(part)
+    middle = len(rows) // 2
+    return Gap(int(columns[middle]), int(rows[middle]), width, int(part.sum()), height)
+
+
+def _reached(
+    room: Float[np.ndarray, "rows columns"], free: Mask, seeds: Mask, ball: float
+) -> Mask:
+    """Return the free cells that a ball covers on its way from the seeds."""
+    _, numbers = cv2.connectedComponents(((room > ball) & free).view(np.uint8), connectivity=4)
+    touched = np.zeros(int(numbers.max()) + 1, dtype=bool)
+    touched[numbers[seeds]] = True
+    touched[0] = False
+    return free & (_distance(touched[numbers]) <= ball + 0.5)
+
+
+def _facing(
+    numbers: Int[np.ndarray, "rows columns"], count: int, drawn: Mask, outside: Mask, height: float
+) -> Float[np.ndarray, "parts 2"]:
+    """Return how long every part's walls are, and how much of that is a line before the outside."""
+    walled = (numbers > 0) & dilate(drawn)
+    behind = walled & (_distance(outside) <= WALL * height + 2)
+    at_gap = (numbers > 0) & dilate(outside)
+    walled &= ~dilate(at_gap, 2)
+    behind &= walled
+    lengths = [np.bincount(numbers[mask], minlength=count) for mask in (walled, behind)]
+    return np.stack(lengths, axis=1).astype(float)
+
+
+def _is_inside(walled: float, facing: float, height: float) -> bool:
+    return facing >= max(LEAST_FACING * walled, LEAST_FACING_LENGTH * height)
+
+
+def _distance(marked: Mask) -> Float[np.ndarray, "rows columns"]:
+    return cv2.distanceTransform((~marked).view(np.uint8), cv2.DIST_L2, 5)
+
+
+def _around(mask: Mask, margin: int) -> tuple[slice, slice]:
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    return (
+        slice(max(int(rows[0]) - margin, 0), int(rows[-1]) + margin + 1),
+        slice(max(int(columns[0]) - margin, 0), int(columns[-1]) + margin + 1),
+    )
