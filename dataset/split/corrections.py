@@ -23,6 +23,8 @@ from toonset.dataset.split.open_outlines import Gap, close_outlines
 from toonset.dataset.split.shadows import find_shadows
 from toonset.dataset.split.touching.cut import Cut, part_touching
 
+MOST_LOST = 0.2  # of a figure that a shadow alone encloses
+
 
 @dataclass(frozen=True, eq=False)
 class SheetState:
@@ -95,11 +97,30 @@ def remove_shadows(state: SheetState) -> SheetState | None:
         return None
     seen = state.rgba, state.ground, state.tolerance
     shadow = find_shadows(state.blobs, state.main_blobs, *seen)
+    paper = _paper(state, shadow)
+    lines = _outlines(state, shadow, paper)
+    if lines.any():  # a pencil's grey
+        shadow = shadow & ~lines
+        paper = _paper(state, shadow)
     if not shadow.any():
         return None
-    free = ~state.painted | state.ruled | shadow
-    paper = joined(free if state.filled is None else free & ~state.filled, state.ring)
     return replace(state, shadow=shadow, paper=paper, blobs=find_blobs(~paper))
+
+
+def _paper(state: SheetState, shadow: Bool[np.ndarray, "rows columns"]) -> np.ndarray:
+    free = ~state.painted | state.ruled | shadow
+    return joined(free if state.filled is None else free & ~state.filled, state.ring)
+
+
+def _outlines(
+    state: SheetState,
+    shadow: Bool[np.ndarray, "rows columns"],
+    paper: Bool[np.ndarray, "rows columns"],
+) -> Bool[np.ndarray, "rows columns"]:
+    """Return the shadows without which much of their figure is paper: they are its outline."""
+    labels, areas = state.blobs.labels, state.blobs.areas
+    lost = np.bincount(labels[paper & ~shadow], minlength=len(areas) + 1)[1:]
+    return shadow & np.append(False, lost > MOST_LOST * areas)[labels]
 
 
 def cut_touching_figures(state: SheetState) -> SheetState | None:

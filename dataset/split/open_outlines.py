@@ -79,6 +79,25 @@ def close_outlines(walls: Mask, paper: Mask, ring: Mask) -> tuple[Mask, tuple[Ga
     return filled, tuple(scaled)
 
 
+def line_walls(
+    numbers: Int[np.ndarray, "rows columns"], count: int, drawn: Mask, outside: Mask, height: float
+) -> Bool[np.ndarray, " parts"]:
+    """Return which patches are closed off by lines: a good share of their walls has no limb behind.
+
+    Args:
+        numbers: of every cell's patch, from 1; 0 elsewhere.
+        count: of numbers, with 0.
+        drawn: what walls are made of.
+        outside: what lies behind a line around the figure.
+        height: of the figure, in cells.
+    """
+    walled = (numbers > 0) & dilate(drawn)
+    walled &= ~dilate((numbers > 0) & dilate(outside), 2)  # an opening is no wall
+    behind = walled & (_distance(outside) <= WALL * height + 2)
+    length, facing = (np.bincount(numbers[mask], minlength=count) for mask in (walled, behind))
+    return facing >= np.maximum(LEAST_FACING * length, LEAST_FACING_LENGTH * height)
+
+
 _CROSS = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
 
 
@@ -109,9 +128,9 @@ def _close(drawn: Mask, outside: Mask, seeds: Mask, height: float) -> tuple[Mask
     room = _distance(drawn)
     reached = _reached(room, outside, seeds, LARGEST * height)
     numbers, areas = sized_parts(outside & ~reached, connectivity=4)
-    facing = _facing(numbers, len(areas), drawn, reached, height)
+    inside = line_walls(numbers, len(areas), drawn, reached, height)
     for number in range(1, len(areas)):
-        if areas[number] < LEAST_POCKET * height**2 or not _is_inside(*facing[number], height):
+        if areas[number] < LEAST_POCKET * height**2 or not inside[number]:
             continue
         window = _around(numbers == number, round(WALL * height) + 4)
         found = _smallest(
@@ -132,11 +151,11 @@ def _smallest(
     while ball < LARGEST * height * STEP and left.any():
         within = _reached(room, left | reached, reached, min(ball, LARGEST * height))
         numbers, areas = sized_parts(left & ~within, connectivity=4)
-        facing = _facing(numbers, len(areas), drawn, within, height)
+        inside = line_walls(numbers, len(areas), drawn, within, height)
         for number in range(1, len(areas)):
             part = numbers == number
             large = areas[number] >= LEAST_POCKET * height**2 and (room[part] > ball).any()
-            if large and _is_inside(*facing[number], height):
+            if large and inside[number]:
                 found.append((part, _gap(part, within, 2 * ball - 1, height)))
                 left = left & ~part
         room = np.where(left | reached, room, 0)
@@ -152,32 +171,13 @@ def _gap(part: Mask, outside: Mask, width: float, height: float) -> Gap:
     return Gap(int(columns[middle]), int(rows[middle]), width, int(part.sum()), height)
 
 
-def _reached(
-    room: Float[np.ndarray, "rows columns"], free: Mask, seeds: Mask, ball: float
-) -> Mask:
+def _reached(room: Float[np.ndarray, "rows columns"], free: Mask, seeds: Mask, ball: float) -> Mask:
     """Return the free cells that a ball covers on its way from the seeds."""
     _, numbers = cv2.connectedComponents(((room > ball) & free).view(np.uint8), connectivity=4)
     touched = np.zeros(int(numbers.max()) + 1, dtype=bool)
     touched[numbers[seeds]] = True
     touched[0] = False
     return free & (_distance(touched[numbers]) <= ball + 0.5)
-
-
-def _facing(
-    numbers: Int[np.ndarray, "rows columns"], count: int, drawn: Mask, outside: Mask, height: float
-) -> Float[np.ndarray, "parts 2"]:
-    """Return how long every part's walls are, and how much of that is a line before the outside."""
-    walled = (numbers > 0) & dilate(drawn)
-    behind = walled & (_distance(outside) <= WALL * height + 2)
-    at_gap = (numbers > 0) & dilate(outside)
-    walled &= ~dilate(at_gap, 2)
-    behind &= walled
-    lengths = [np.bincount(numbers[mask], minlength=count) for mask in (walled, behind)]
-    return np.stack(lengths, axis=1).astype(float)
-
-
-def _is_inside(walled: float, facing: float, height: float) -> bool:
-    return facing >= max(LEAST_FACING * walled, LEAST_FACING_LENGTH * height)
 
 
 def _distance(marked: Mask) -> Float[np.ndarray, "rows columns"]:

@@ -17,7 +17,13 @@ from toonset.dataset.split.background import Background, find_background, flatte
 from toonset.dataset.split.crop import Crop, boxed_crops, found_crops, grid_crops
 from toonset.dataset.split.figures.blobs import as_box
 from toonset.dataset.split.figures.text_and_swatches import words
-from toonset.dataset.split.holes import BorderLook, open_holes, outline_look
+from toonset.dataset.split.holes import (
+    BorderLook,
+    open_holes,
+    outline_look,
+    paint_paper,
+    unpainted_patches,
+)
 from toonset.dataset.split.matting import cut_out, edge_softness_px
 from toonset.dataset.split.segment import SheetLayout, find_layout, find_paint
 from toonset.dataset.split.warnings import border_warnings, figure_warnings
@@ -221,6 +227,9 @@ def _views(
     holes = 0
     if ground.rgb is None:
         cuts = [np.where(c.solid[..., None], _window(rgba, c.box), np.uint8(0)) for c in crops]
+        patches = [unpainted_patches(c.solid, c.enclosed, c.filled) for c in crops]
+        each = zip(cuts, crops, patches, strict=True)
+        cuts = [paint_paper(cut, c.solid, own) if own.any() else cut for cut, c, own in each]
     else:
         papers = [ground.colors(crop.box) for crop in crops]
         softness = _softness(rgba, ground, crops)
@@ -232,7 +241,7 @@ def _views(
         for crop, paper in zip(crops, papers, strict=True):
             rgb = _window(rgba, crop.box)[..., :3]
             solid, opened = open_holes(
-                rgb, crop.solid, crop.enclosed, paper, look, options.least_hole
+                *(rgb, crop.solid, crop.enclosed, paper), *(look, options.least_hole, crop.filled)
             )
             cuts.append(cut_out(rgb, solid, paper, ground.tolerance, softness))
             holes += opened
