@@ -19,11 +19,15 @@ from toonset.dataset.split.figures.blobs import (
     find_main_blobs,
     remove_strangers,
 )
+from toonset.dataset.split.holes import LINE
 from toonset.dataset.split.open_outlines import Gap, close_outlines
 from toonset.dataset.split.shadows import find_shadows
 from toonset.dataset.split.touching.cut import Cut, part_touching
+from toonset.raster import wider_than
 
 MOST_LOST = 0.2  # of a figure that a shadow alone encloses
+LEAST_LOST = 0.01  # of the same, where the shadow is mostly lines
+MOST_BROAD = 0.5  # of a shadow that is mostly lines
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +124,11 @@ def _outlines(
     """Return the shadows without which much of their figure is paper: they are its outline."""
     labels, areas = state.blobs.labels, state.blobs.areas
     lost = np.bincount(labels[paper & ~shadow], minlength=len(areas) + 1)[1:]
-    return shadow & np.append(False, lost > MOST_LOST * areas)[labels]
+    height = float(np.median(state.blobs.boxes[state.main_blobs, 3]))
+    thick = wider_than(shadow, max(1, round(LINE * height)))
+    shaded, broad = (np.bincount(labels[m], minlength=len(areas) + 1)[1:] for m in (shadow, thick))
+    thin = broad < MOST_BROAD * shaded
+    return shadow & np.append(False, lost > np.where(thin, LEAST_LOST, MOST_LOST) * areas)[labels]
 
 
 def cut_touching_figures(state: SheetState) -> SheetState | None:

@@ -24,12 +24,13 @@ from jaxtyping import Bool, Float, UInt8
 
 from toonset.dataset.split.background import difference
 from toonset.dataset.split.open_outlines import LEAST_POCKET, line_walls
-from toonset.raster import depth_inside, dilate, distance_to, erode, sized_parts
+from toonset.raster import depth_inside, dilate, distance_to, erode, sized_parts, wider_than
 from toonset.view import over_white
 
 LEAST_HOLE_PX = 9
 LEAST_ISLAND_PX = 4
 LINE_ART = 0.5  # of the figure without its lines: more in the background's colour is a line drawing
+EDGE_PX = 2.0  # of a figure on transparency: its soft edge
 LINE = 0.012  # of the figure's height: half of the thickest line
 INK_LUMA = 64  # of 255: darker is ink
 HEAD = 0.25  # of the figure's height from its top: no holes there
@@ -150,7 +151,7 @@ def is_line_art(
     """Return whether a figure is lines around paper, with few painted patches."""
     tall = int(mask.any(axis=1).sum())
     reach = max(1, round(LINE * tall))
-    painted = dilate(erode(mask & ~enclosed, reach), reach)
+    painted = wider_than(mask & ~enclosed, reach)
     paper = int(enclosed.sum())
     return paper > LINE_ART * (paper + int(painted.sum()))
 
@@ -180,24 +181,32 @@ def unpainted_patches(
     return found | (large & line_walls(numbers, len(areas), drawn, ~mask, tall))[numbers]
 
 
-def paint_paper(
+def with_paper(
     rgba: UInt8[np.ndarray, "height width 4"],
     mask: Bool[np.ndarray, "height width"],
-    patches: Bool[np.ndarray, "height width"],
-) -> UInt8[np.ndarray, "height width 4"]:
-    """Return a picture with white paper under patches, and under the soft edges of lines there.
+    enclosed: Bool[np.ndarray, "height width"],
+    filled: Bool[np.ndarray, "height width"] | None,
+) -> tuple[UInt8[np.ndarray, "height width 4"], bool]:
+    """Return a figure with white paper under its unpainted patches, and whether it has any.
+
+    There the soft edges of lines become opaque, too; in a line drawing all but its outermost edge.
 
     Args:
-        rgba: the picture.
-        mask: the figure; around it nothing changes.
-        patches: what is made opaque.
+        rgba: the figure on transparency.
+        mask: where it is, with everything that it encloses.
+        enclosed: its transparent patches.
+        filled: those that an open outline encloses; None: none.
     """
-    inner = mask & (distance_to(patches) < distance_to(~mask))
-    under = patches | (inner & (rgba[..., 3] < 255))
+    patches = unpainted_patches(mask, enclosed, filled)
+    if not patches.any():
+        return rgba, False
+    away = distance_to(~mask)
+    inner = away > EDGE_PX if is_line_art(mask, enclosed) else distance_to(patches) < away
+    under = patches | (mask & inner & (rgba[..., 3] < 255))
     result = rgba.copy()
     rgb = np.rint(255 * over_white(rgba[under][None])[0])
     result[under] = np.column_stack([rgb, np.full(len(rgb), 255)]).astype(np.uint8)
-    return result
+    return result, True
 
 
 def _is_behind_a_limb(

@@ -10,7 +10,7 @@ does not enter it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -23,8 +23,10 @@ SEEN_AT = 280  # cells of a figure's height: outlines of larger figures are clos
 LARGEST = 0.05  # of the figure's height: half of the widest gap that is closed
 WALL = 0.03  # of the figure's height, and two cells: no line is thicker
 LEAST_POCKET = 0.002  # of the figure's squared height: smaller pockets are corners of the outline
-LEAST_FACING = 0.15  # of a pocket's walls: lines with the outside behind them
+LEAST_FACING = 0.1  # of a pocket's walls: lines with the outside behind them
 LEAST_FACING_LENGTH = 0.06  # of the figure's height: the same
+DOUBTFUL = 0.8  # of the least share and length of lines: with less a pocket is a real gap
+DOUBTFUL_POCKET = 0.01  # of the figure's squared height: smaller ones are not worth a word
 JOIN = 0.012  # of the figure's height: across gaps so wide lines are of one figure
 STEP = 1.2  # times the ball before: the next
 
@@ -33,7 +35,7 @@ Mask = Bool[np.ndarray, "rows columns"]
 
 @dataclass(frozen=True)
 class Gap:
-    """Gap of an outline that was closed.
+    """Gap of an outline.
 
     Attributes:
         x: of its middle, in cells of the sheet.
@@ -41,6 +43,7 @@ class Gap:
         width: in cells.
         area: of the pocket that was open there, in cells.
         height: of the sheet's figures, in cells.
+        closed: whether what lies behind it was taken for the figure's inside.
     """
 
     x: int
@@ -48,6 +51,7 @@ class Gap:
     width: float
     area: int
     height: float
+    closed: bool = True
 
 
 def close_outlines(walls: Mask, paper: Mask, ring: Mask) -> tuple[Mask, tuple[Gap, ...]]:
@@ -72,7 +76,7 @@ def close_outlines(walls: Mask, paper: Mask, ring: Mask) -> tuple[Mask, tuple[Ga
     scaled = [
         Gap(
             *(step * gap.x + step // 2, step * gap.y + step // 2, step * gap.width),
-            *(step * step * gap.area, height),
+            *(step * step * gap.area, height, gap.closed),
         )
         for gap in gaps
     ]
@@ -91,11 +95,31 @@ def line_walls(
         outside: what lies behind a line around the figure.
         height: of the figure, in cells.
     """
+    length, facing = _walls(numbers, count, drawn, outside, height)
+    return _is_inside(length, facing, height)
+
+
+def _is_inside(
+    length: Int[np.ndarray, "*parts"], facing: Int[np.ndarray, "*parts"], height: float
+) -> Bool[np.ndarray, "*parts"]:
+    return facing >= np.maximum(LEAST_FACING * length, LEAST_FACING_LENGTH * height)
+
+
+def _is_doubtful(area: int, length: int, facing: int, height: float) -> bool:
+    """Return whether a pocket that is no inside has still some walls of lines."""
+    return area >= DOUBTFUL_POCKET * height**2 and facing >= DOUBTFUL * max(
+        LEAST_FACING * length, LEAST_FACING_LENGTH * height
+    )
+
+
+def _walls(
+    numbers: Int[np.ndarray, "rows columns"], count: int, drawn: Mask, outside: Mask, height: float
+) -> tuple[Int[np.ndarray, " parts"], Int[np.ndarray, " parts"]]:
+    """Return how long every patch's walls are, and how much of that is a line."""
     walled = (numbers > 0) & dilate(drawn)
     walled &= ~dilate((numbers > 0) & dilate(outside), 2)  # an opening is no wall
     behind = walled & (_distance(outside) <= WALL * height + 2)
-    length, facing = (np.bincount(numbers[mask], minlength=count) for mask in (walled, behind))
-    return facing >= np.maximum(LEAST_FACING * length, LEAST_FACING_LENGTH * height)
+    return tuple(np.bincount(numbers[mask], minlength=count) for mask in (walled, behind))
 
 
 _CROSS = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
@@ -128,9 +152,10 @@ def _close(drawn: Mask, outside: Mask, seeds: Mask, height: float) -> tuple[Mask
     room = _distance(drawn)
     reached = _reached(room, outside, seeds, LARGEST * height)
     numbers, areas = sized_parts(outside & ~reached, connectivity=4)
-    inside = line_walls(numbers, len(areas), drawn, reached, height)
+    _, facing = _walls(numbers, len(areas), drawn, reached, height)
+    least = LEAST_FACING_LENGTH * height
     for number in range(1, len(areas)):
-        if areas[number] < LEAST_POCKET * height**2 or not inside[number]:
+        if areas[number] < LEAST_POCKET * height**2 or facing[number] < least:
             continue
         window = _around(numbers == number, round(WALL * height) + 4)
         found = _smallest(
@@ -138,8 +163,9 @@ def _close(drawn: Mask, outside: Mask, seeds: Mask, height: float) -> tuple[Mask
         )
         y, x = window[0].start, window[1].start
         for pocket, gap in found:
-            pockets[window] |= pocket
-            gaps.append(Gap(gap.x + x, gap.y + y, gap.width, gap.area, height))
+            if gap.closed:
+                pockets[window] |= pocket
+            gaps.append(replace(gap, x=gap.x + x, y=gap.y + y))
     return pockets, gaps
 
 
@@ -147,20 +173,26 @@ def _smallest(
     pocket: Mask, drawn: Mask, reached: Mask, room: Float[np.ndarray, "rows columns"], height: float
 ) -> list[tuple[Mask, Gap]]:
     """Return the parts of a pocket, each cut off by the smallest ball that does not enter it."""
-    found, left, ball = list[tuple[Mask, Gap]](), pocket, 1.0
+    found, doubtful = list[tuple[Mask, Gap]](), list[tuple[Mask, Gap]]()
+    left, ball = pocket, 1.0
     while ball < LARGEST * height * STEP and left.any():
         within = _reached(room, left | reached, reached, min(ball, LARGEST * height))
         numbers, areas = sized_parts(left & ~within, connectivity=4)
-        inside = line_walls(numbers, len(areas), drawn, within, height)
+        length, facing = _walls(numbers, len(areas), drawn, within, height)
         for number in range(1, len(areas)):
             part = numbers == number
-            large = areas[number] >= LEAST_POCKET * height**2 and (room[part] > ball).any()
-            if large and inside[number]:
+            if areas[number] < LEAST_POCKET * height**2 or not (room[part] > ball).any():
+                continue
+            if _is_inside(length[number], facing[number], height):
                 found.append((part, _gap(part, within, 2 * ball - 1, height)))
                 left = left & ~part
+            elif _is_doubtful(areas[number], length[number], facing[number], height):
+                doubtful.append((part, _gap(part, within, 2 * ball - 1, height)))
         room = np.where(left | reached, room, 0)
         ball *= STEP
-    return found
+    still = [(part & left, replace(gap, closed=False)) for part, gap in doubtful]
+    large = [(part, gap) for part, gap in still if part.sum() > gap.area / 2]
+    return found + large[-1:]
 
 
 def _gap(part: Mask, outside: Mask, width: float, height: float) -> Gap:

@@ -8,7 +8,10 @@ from jaxtyping import UInt8
 from toonset.dataset.split.background import Background
 from toonset.dataset.split.figures.blobs import LOWEST, Blobs, shared_colors
 from toonset.dataset.split.figures.grouping import LEAST_PART
-from toonset.dataset.split.segment import SheetLayout
+from toonset.dataset.split.holes import LINE
+from toonset.dataset.split.open_outlines import Gap
+from toonset.dataset.split.segment import SheetLayout, figure_cells
+from toonset.raster import wider_than
 from toonset.view import View
 
 SURE_ENOUGH = 0.9  # of the border in one colour: less is worth a warning
@@ -17,6 +20,9 @@ PROPORTIONS = 1.2  # times the widest view's, or less than its inverse of the na
 ALIKE = 0.6  # of the colours that the views share among each other: less is another thing
 BROAD = 1.15  # times its own height: wider than arms reach
 NEARER = 1.2  # times the gap between parts and their bodies: so near a part may be another's
+WIDE_GAP = 0.04  # of the figure's height: a wider gap may be meant
+LARGE_POCKET = 0.01  # of the figure's squared height: so much more or less changes it
+LEAST_SOLID = 0.5  # of a view: less beside its lines is a hollow figure
 WIDE = 1.8  # times the median width: two figures that touch
 
 
@@ -33,6 +39,8 @@ def figure_warnings(
     """Return a line for every cut in doubt, every wide view, all left out that may be views."""
     return (
         *_cuts(found),
+        *_open_outlines(found),
+        *_hollow_views(views),
         *_wide_views(views),
         *_near_parts(found, views),
         *_like_views(found, views, rgba),
@@ -47,6 +55,46 @@ def _cuts(found: SheetLayout) -> list[str]:
             f"two figures touch within {width} x {height} px at {x}, {y}; they were cut apart "
             f"through {100 * cut.crossed:.1f} % of their height: look whether the cut is right"
         )
+    return said
+
+
+def _open_outlines(found: SheetLayout) -> list[str]:
+    """Return a line for every figure whose outline is open by more than is closed unasked."""
+    said, number = list[str](), figure_cells(found)
+    for figure in range(found.grouping.count):
+        own = [
+            gap
+            for gap in found.gaps
+            if _is_worth_a_word(gap) and number[gap.y, gap.x] == figure + 1
+        ]
+        if own:
+            gap = max(own, key=lambda gap: gap.area)
+            x, y = gap.x * found.cell_px, gap.y * found.cell_px
+            said.append(
+                f"the outline of {figure:03d}.png is open at {x}, {y}"
+                + (
+                    f" over {gap.width * found.cell_px:.0f} px; it was closed there"
+                    if gap.closed
+                    else ""
+                )
+            )
+    return said
+
+
+def _is_worth_a_word(gap: Gap) -> bool:
+    return not gap.closed or (
+        gap.width > WIDE_GAP * gap.height and gap.area > LARGE_POCKET * gap.height**2
+    )
+
+
+def _hollow_views(views: list[View]) -> list[str]:
+    """Return a line for every view that is lines alone."""
+    said = []
+    for view in views:
+        reach = max(1, round(LINE * view.figure_box[3]))
+        solid = np.count_nonzero(wider_than(view.mask, reach))
+        if solid < LEAST_SOLID * np.count_nonzero(view.mask):
+            said.append(f"view {view.name} is hollow: it is lines alone; close its outline")
     return said
 
 
