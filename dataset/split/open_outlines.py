@@ -22,10 +22,12 @@ from toonset.raster import dilate, sized_parts
 SEEN_AT = 280  # cells of a figure's height: outlines of larger figures are closed on coarser ones
 LARGEST = 0.05  # of the figure's height: half of the widest gap that is closed
 WALL = 0.03  # of the figure's height, and two cells: no line is thicker
-LEAST_POCKET = 0.002  # of the figure's squared height: smaller pockets are corners of the outline
-LEAST_FACING = 0.1  # of a pocket's walls: lines with the outside behind them
-LEAST_FACING_LENGTH = 0.06  # of the figure's height: the same
-DOUBTFUL = 0.8  # of the least share and length of lines: with less a pocket is a real gap
+LEAST_POCKET = 0.003  # of the figure's squared height: smaller pockets are corners of the outline
+ROOMIER = 2.0  # times the gap's width: a pocket that is narrower is a cleft
+LEAST_FACING = 0.25  # of a pocket's walls: lines with the outside behind them
+LEAST_FACING_LENGTH = 0.1  # of the figure's height: the same
+LONG_FACING = 0.4  # of the figure's height: so long lines are enough, whatever the share
+DOUBTFUL = 0.6  # of the least share and length of lines: with less a pocket is a real gap
 DOUBTFUL_POCKET = 0.01  # of the figure's squared height: smaller ones are not worth a word
 JOIN = 0.012  # of the figure's height: across gaps so wide lines are of one figure
 STEP = 1.2  # times the ball before: the next
@@ -102,7 +104,8 @@ def line_walls(
 def _is_inside(
     length: Int[np.ndarray, "*parts"], facing: Int[np.ndarray, "*parts"], height: float
 ) -> Bool[np.ndarray, "*parts"]:
-    return facing >= np.maximum(LEAST_FACING * length, LEAST_FACING_LENGTH * height)
+    share = np.minimum(LEAST_FACING * length, LONG_FACING * height)
+    return facing >= np.maximum(share, LEAST_FACING_LENGTH * height)
 
 
 def _is_doubtful(area: int, length: int, facing: int, height: float) -> bool:
@@ -153,7 +156,7 @@ def _close(drawn: Mask, outside: Mask, seeds: Mask, height: float) -> tuple[Mask
     reached = _reached(room, outside, seeds, LARGEST * height)
     numbers, areas = sized_parts(outside & ~reached, connectivity=4)
     _, facing = _walls(numbers, len(areas), drawn, reached, height)
-    least = LEAST_FACING_LENGTH * height
+    least = DOUBTFUL * LEAST_FACING_LENGTH * height
     for number in range(1, len(areas)):
         if areas[number] < LEAST_POCKET * height**2 or facing[number] < least:
             continue
@@ -181,7 +184,7 @@ def _smallest(
         length, facing = _walls(numbers, len(areas), drawn, within, height)
         for number in range(1, len(areas)):
             part = numbers == number
-            if areas[number] < LEAST_POCKET * height**2 or not (room[part] > ball).any():
+            if areas[number] < LEAST_POCKET * height**2 or room[part].max() < ROOMIER * ball:
                 continue
             if _is_inside(length[number], facing[number], height):
                 found.append((part, _gap(part, within, 2 * ball - 1, height)))
