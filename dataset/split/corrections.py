@@ -19,8 +19,7 @@ from toonset.dataset.split.figures.blobs import (
     find_main_blobs,
     remove_strangers,
 )
-from toonset.dataset.split.holes import LINE
-from toonset.dataset.split.open_outlines import Gap, close_outlines
+from toonset.dataset.split.open_outlines import LINE, Gap, close_outlines
 from toonset.dataset.split.shadows import find_shadows
 from toonset.dataset.split.touching.cut import Cut, part_touching
 from toonset.raster import wider_than

@@ -23,7 +23,7 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from toonset.dataset.split.background import difference
-from toonset.dataset.split.open_outlines import LEAST_POCKET, line_walls
+from toonset.dataset.split.open_outlines import LEAST_POCKET, LINE, line_walls
 from toonset.raster import depth_inside, dilate, distance_to, erode, sized_parts, wider_than
 from toonset.view import over_white
 
@@ -31,7 +31,6 @@ LEAST_HOLE_PX = 9
 LEAST_ISLAND_PX = 4
 LINE_ART = 0.5  # of the figure without its lines: more in the background's colour is a line drawing
 EDGE_PX = 2.0  # of a figure on transparency: its soft edge
-LINE = 0.012  # of the figure's height: half of the thickest line
 INK_LUMA = 64  # of 255: darker is ink
 HEAD = 0.25  # of the figure's height from its top: no holes there
 SOFT_SHADE = 48  # levels from the background: nearer is a shade of it

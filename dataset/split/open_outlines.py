@@ -17,22 +17,52 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from toonset.dataset.split.figures.blobs import find_blobs, find_main_blobs
-from toonset.raster import dilate, sized_parts
+from toonset.raster import dilate, sized_parts, wider_than
 
 SEEN_AT = 280  # cells of a figure's height: outlines of larger figures are closed on coarser ones
-LARGEST = 0.05  # of the figure's height: half of the widest gap that is closed
+LARGEST = 0.05  # of the figure's height: half of the widest gap that is closed in line drawings
+LARGEST_PAINTED = 0.02  # the same in painted ones
 WALL = 0.03  # of the figure's height, and two cells: no line is thicker
-LEAST_POCKET = 0.003  # of the figure's squared height: smaller pockets are corners of the outline
-ROOMIER = 2.0  # times the gap's width: a pocket that is narrower is a cleft
-LEAST_FACING = 0.25  # of a pocket's walls: lines with the outside behind them
-LEAST_FACING_LENGTH = 0.1  # of the figure's height: the same
-LONG_FACING = 0.4  # of the figure's height: so long lines are enough, whatever the share
+LEAST_POCKET = 0.002  # of the figure's squared height: smaller pockets are corners of the outline
+LINE = 0.012  # of the figure's height: half of the thickest line
 DOUBTFUL = 0.6  # of the least share and length of lines: with less a pocket is a real gap
 DOUBTFUL_POCKET = 0.01  # of the figure's squared height: smaller ones are not worth a word
 JOIN = 0.012  # of the figure's height: across gaps so wide lines are of one figure
 STEP = 1.2  # times the ball before: the next
 
 Mask = Bool[np.ndarray, "rows columns"]
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Least evidence for the inside of an open outline.
+
+    Attributes:
+        share: of its walls that are lines with the outside behind them.
+        length: of those lines, in the figure's height.
+        enough: so long lines are enough, whatever their share.
+        roomier: times the gap's width: what is narrower is a cleft.
+        area: in the figure's squared height.
+        ball: half of the widest gap, in the figure's height.
+    """
+
+    share: float
+    length: float
+    enough: float
+    roomier: float
+    area: float
+    ball: float
+
+    def holds(
+        self, length: Int[np.ndarray, "*parts"], facing: Int[np.ndarray, "*parts"], height: float
+    ) -> Bool[np.ndarray, "*parts"]:
+        """Return which walls of so many cells have enough lines among them."""
+        share = np.minimum(self.share * length, self.enough * height)
+        return facing >= np.maximum(share, self.length * height)
+
+
+OF_LINES = Evidence(0.1, 0.06, 0.4, 1.5, 0.002, LARGEST)
+OF_PAINT = Evidence(0.25, 0.1, 0.4, 2.0, 0.003, LARGEST_PAINTED)
 
 
 @dataclass(frozen=True)
@@ -98,21 +128,7 @@ def line_walls(
         height: of the figure, in cells.
     """
     length, facing = _walls(numbers, count, drawn, outside, height)
-    return _is_inside(length, facing, height)
-
-
-def _is_inside(
-    length: Int[np.ndarray, "*parts"], facing: Int[np.ndarray, "*parts"], height: float
-) -> Bool[np.ndarray, "*parts"]:
-    share = np.minimum(LEAST_FACING * length, LONG_FACING * height)
-    return facing >= np.maximum(share, LEAST_FACING_LENGTH * height)
-
-
-def _is_doubtful(area: int, length: int, facing: int, height: float) -> bool:
-    """Return whether a pocket that is no inside has still some walls of lines."""
-    return area >= DOUBTFUL_POCKET * height**2 and facing >= DOUBTFUL * max(
-        LEAST_FACING * length, LEAST_FACING_LENGTH * height
-    )
+    return OF_LINES.holds(length, facing, height)
 
 
 def _walls(
@@ -153,43 +169,66 @@ def _pooled(mask: Mask, step: int) -> Mask:
 def _close(drawn: Mask, outside: Mask, seeds: Mask, height: float) -> tuple[Mask, list[Gap]]:
     pockets, gaps = np.zeros_like(drawn), list[Gap]()
     room = _distance(drawn)
-    reached = _reached(room, outside, seeds, LARGEST * height)
+    least = OF_LINES if _is_line_drawing(drawn, outside, height) else OF_PAINT
+    reached = _reached(room, outside, seeds, least.ball * height)
     numbers, areas = sized_parts(outside & ~reached, connectivity=4)
     _, facing = _walls(numbers, len(areas), drawn, reached, height)
-    least = DOUBTFUL * LEAST_FACING_LENGTH * height
+    shortest = DOUBTFUL * least.length * height
     for number in range(1, len(areas)):
-        if areas[number] < LEAST_POCKET * height**2 or facing[number] < least:
+        if areas[number] < least.area * height**2 or facing[number] < shortest:
             continue
         window = _around(numbers == number, round(WALL * height) + 4)
         found = _smallest(
-            *(numbers[window] == number, drawn[window], reached[window], room[window], height)
+            *(
+                numbers[window] == number,
+                drawn[window],
+                reached[window],
+                room[window],
+                height,
+                least,
+            )
         )
         y, x = window[0].start, window[1].start
-        for pocket, gap in found:
+        for inside, gap in found:
             if gap.closed:
-                pockets[window] |= pocket
+                pockets[window] |= inside
             gaps.append(replace(gap, x=gap.x + x, y=gap.y + y))
     return pockets, gaps
 
 
+def _is_line_drawing(drawn: Mask, outside: Mask, height: float) -> bool:
+    """Return whether the sheet shows lines: beside them more paper than paint."""
+    painted = np.count_nonzero(wider_than(drawn, max(1, round(LINE * height))))
+    lines = np.count_nonzero(drawn) - painted
+    enclosed = np.count_nonzero(~drawn & ~outside)
+    return painted < max(enclosed, lines)
+
+
 def _smallest(
-    pocket: Mask, drawn: Mask, reached: Mask, room: Float[np.ndarray, "rows columns"], height: float
+    pocket: Mask,
+    drawn: Mask,
+    reached: Mask,
+    room: Float[np.ndarray, "rows columns"],
+    height: float,
+    least: Evidence,
 ) -> list[tuple[Mask, Gap]]:
     """Return the parts of a pocket, each cut off by the smallest ball that does not enter it."""
     found, doubtful = list[tuple[Mask, Gap]](), list[tuple[Mask, Gap]]()
     left, ball = pocket, 1.0
-    while ball < LARGEST * height * STEP and left.any():
-        within = _reached(room, left | reached, reached, min(ball, LARGEST * height))
+    while ball < least.ball * height * STEP and left.any():
+        within = _reached(room, left | reached, reached, min(ball, least.ball * height))
         numbers, areas = sized_parts(left & ~within, connectivity=4)
         length, facing = _walls(numbers, len(areas), drawn, within, height)
         for number in range(1, len(areas)):
             part = numbers == number
-            if areas[number] < LEAST_POCKET * height**2 or room[part].max() < ROOMIER * ball:
+            if areas[number] < least.area * height**2 or room[part].max() < least.roomier * ball:
                 continue
-            if _is_inside(length[number], facing[number], height):
+            if least.holds(length[number], facing[number], height):
                 found.append((part, _gap(part, within, 2 * ball - 1, height)))
                 left = left & ~part
-            elif _is_doubtful(areas[number], length[number], facing[number], height):
+            elif areas[number] >= DOUBTFUL_POCKET * height**2 and least.holds(
+                length[number], facing[number] / DOUBTFUL, height
+            ):
                 doubtful.append((part, _gap(part, within, 2 * ball - 1, height)))
         room = np.where(left | reached, room, 0)
         ball *= STEP

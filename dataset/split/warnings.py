@@ -8,8 +8,7 @@ from jaxtyping import UInt8
 from toonset.dataset.split.background import Background
 from toonset.dataset.split.figures.blobs import LOWEST, Blobs, shared_colors
 from toonset.dataset.split.figures.grouping import LEAST_PART
-from toonset.dataset.split.holes import LINE
-from toonset.dataset.split.open_outlines import Gap
+from toonset.dataset.split.open_outlines import LINE, Gap
 from toonset.dataset.split.segment import SheetLayout, figure_cells
 from toonset.raster import wider_than
 from toonset.view import View
