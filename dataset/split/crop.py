@@ -137,8 +137,9 @@ def _tight(crop: Crop, shape: tuple[int, ...], margin: int) -> Crop | None:
     pad = ((before_y, after_y), (before_x, after_x))
     window = slice(top, top + height), slice(left, left + width)
     box = x - before_x, y - before_y, width + before_x + after_x, height + before_y + after_y
-    masks = crop.solid, crop.enclosed, crop.filled
-    return Crop(box, *(None if mask is None else np.pad(mask[window], pad) for mask in masks))
+    solid, enclosed = np.pad(crop.solid[window], pad), np.pad(crop.enclosed[window], pad)
+    filled = None if crop.filled is None else np.pad(crop.filled[window], pad)
+    return Crop(box, solid, enclosed, filled)
 
 
 def _own_pixels(

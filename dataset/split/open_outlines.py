@@ -20,8 +20,9 @@ from toonset.dataset.split.figures.blobs import find_blobs, find_main_blobs
 from toonset.raster import dilate, sized_parts, wider_than
 
 SEEN_AT = 280  # cells of a figure's height: outlines of larger figures are closed on coarser ones
-LARGEST = 0.05  # of the figure's height: half of the widest gap that is closed in line drawings
+LARGEST = 0.03  # of the figure's height: half of the widest gap that is closed in line drawings
 LARGEST_PAINTED = 0.02  # the same in painted ones
+LOOKED_FOR = 0.05  # the same of gaps that are said, not closed
 WALL = 0.03  # of the figure's height, and two cells: no line is thicker
 LEAST_POCKET = 0.002  # of the figure's squared height: smaller pockets are corners of the outline
 LINE = 0.012  # of the figure's height: half of the thickest line
@@ -43,7 +44,8 @@ class Evidence:
         enough: so long lines are enough, whatever their share.
         roomier: times the gap's width: what is narrower is a cleft.
         area: in the figure's squared height.
-        ball: half of the widest gap, in the figure's height.
+        ball: half of the widest gap that is closed, in the figure's height.
+        looked_for: the same of gaps that are found.
     """
 
     share: float
@@ -52,6 +54,7 @@ class Evidence:
     roomier: float
     area: float
     ball: float
+    looked_for: float
 
     def holds(
         self, length: Int[np.ndarray, "*parts"], facing: Int[np.ndarray, "*parts"], height: float
@@ -61,8 +64,8 @@ class Evidence:
         return facing >= np.maximum(share, self.length * height)
 
 
-OF_LINES = Evidence(0.1, 0.06, 0.4, 1.5, 0.002, LARGEST)
-OF_PAINT = Evidence(0.25, 0.1, 0.4, 2.0, 0.003, LARGEST_PAINTED)
+OF_LINES = Evidence(0.1, 0.06, 0.4, 1.5, 0.002, LARGEST, LOOKED_FOR)
+OF_PAINT = Evidence(0.25, 0.1, 0.4, 2.0, 0.003, LARGEST_PAINTED, LARGEST_PAINTED)
 
 
 @dataclass(frozen=True)
@@ -138,7 +141,8 @@ def _walls(
     walled = (numbers > 0) & dilate(drawn)
     walled &= ~dilate((numbers > 0) & dilate(outside), 2)  # an opening is no wall
     behind = walled & (_distance(outside) <= WALL * height + 2)
-    return tuple(np.bincount(numbers[mask], minlength=count) for mask in (walled, behind))
+    length, facing = (np.bincount(numbers[mask], minlength=count) for mask in (walled, behind))
+    return length, facing
 
 
 _CROSS = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
@@ -170,7 +174,7 @@ def _close(drawn: Mask, outside: Mask, seeds: Mask, height: float) -> tuple[Mask
     pockets, gaps = np.zeros_like(drawn), list[Gap]()
     room = _distance(drawn)
     least = OF_LINES if _is_line_drawing(drawn, outside, height) else OF_PAINT
-    reached = _reached(room, outside, seeds, least.ball * height)
+    reached = _reached(room, outside, seeds, least.looked_for * height)
     numbers, areas = sized_parts(outside & ~reached, connectivity=4)
     _, facing = _walls(numbers, len(areas), drawn, reached, height)
     shortest = DOUBTFUL * least.length * height
@@ -201,7 +205,7 @@ def _is_line_drawing(drawn: Mask, outside: Mask, height: float) -> bool:
     painted = np.count_nonzero(wider_than(drawn, max(1, round(LINE * height))))
     lines = np.count_nonzero(drawn) - painted
     enclosed = np.count_nonzero(~drawn & ~outside)
-    return painted < max(enclosed, lines)
+    return bool(painted < max(enclosed, lines))
 
 
 def _smallest(
@@ -215,8 +219,8 @@ def _smallest(
     """Return the parts of a pocket, each cut off by the smallest ball that does not enter it."""
     found, doubtful = list[tuple[Mask, Gap]](), list[tuple[Mask, Gap]]()
     left, ball = pocket, 1.0
-    while ball < least.ball * height * STEP and left.any():
-        within = _reached(room, left | reached, reached, min(ball, least.ball * height))
+    while ball < least.looked_for * height * STEP and left.any():
+        within = _reached(room, left | reached, reached, min(ball, least.looked_for * height))
         numbers, areas = sized_parts(left & ~within, connectivity=4)
         length, facing = _walls(numbers, len(areas), drawn, within, height)
         for number in range(1, len(areas)):
@@ -224,7 +228,8 @@ def _smallest(
             if areas[number] < least.area * height**2 or room[part].max() < least.roomier * ball:
                 continue
             if least.holds(length[number], facing[number], height):
-                found.append((part, _gap(part, within, 2 * ball - 1, height)))
+                gap = _gap(part, within, 2 * ball - 1, height)
+                found.append((part, replace(gap, closed=ball <= least.ball * height)))
                 left = left & ~part
             elif areas[number] >= DOUBTFUL_POCKET * height**2 and least.holds(
                 length[number], facing[number] / DOUBTFUL, height

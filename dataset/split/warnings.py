@@ -81,9 +81,8 @@ def _open_outlines(found: SheetLayout) -> list[str]:
 
 
 def _is_worth_a_word(gap: Gap) -> bool:
-    return not gap.closed or (
-        gap.width > WIDE_GAP * gap.height and gap.area > LARGE_POCKET * gap.height**2
-    )
+    far = gap.width > WIDE_GAP * gap.height and gap.area > LARGE_POCKET * gap.height**2
+    return far or not gap.closed
 
 
 def _hollow_views(views: list[View]) -> list[str]:
