@@ -23,6 +23,11 @@ def erode(mask: Mask, by: int = 1) -> Mask:
     return cv2.erode(mask.view(np.uint8), _square(by), borderValue=0).view(np.bool_)
 
 
+def wider_than(mask: Mask, by: int) -> Mask:
+    """Return a mask's parts that are wider than twice `by` pixels (morphological opening)."""
+    return dilate(erode(mask, by), by) & mask
+
+
 def is_uniform(values: Shaped[np.ndarray, "height width"]) -> Mask:
     """Return where a pixel and its eight neighbours have one value, of 16 bits at most."""
     small = values.astype(np.int16, copy=False)

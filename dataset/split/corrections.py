@@ -16,7 +16,13 @@ from jaxtyping import Bool, Int, UInt8
 from toonset.dataset.split.figures.blobs import Blobs, add_blocks, find_blobs, remove_strangers
 from toonset.dataset.split.figures.rows import Group, find_groups
 from toonset.dataset.split.figures.shadows import find_shadows
+from toonset.dataset.split.open_outlines import LINE, Gap, close_outlines
 from toonset.dataset.split.touching.cut import Cut, part_touching
+from toonset.raster import wider_than
+
+MOST_LOST = 0.2  # of a figure that a shadow alone encloses
+LEAST_LOST = 0.01  # of the same, where the shadow is mostly lines
+MOST_BROAD = 0.5  # of a shadow that is mostly lines
 
 
 @dataclass(frozen=True)
@@ -61,6 +67,8 @@ class SheetState:
         taken: which group of figures is wanted.
         bodies: numbers of the patches that are bodies of views; None: those of that group.
         cuts: where touching figures were cut apart.
+        filled: cells of background within outlines that are open.
+        gaps: where those are open.
     """
 
     rgba: UInt8[np.ndarray, "rows columns 4"]
@@ -75,6 +83,8 @@ class SheetState:
     taken: Taken
     bodies: Int[np.ndarray, " bodies"] | None = None
     cuts: tuple[Cut, ...] = ()
+    filled: Bool[np.ndarray, "rows columns"] | None = None
+    gaps: tuple[Gap, ...] = ()
 
     @classmethod
     def first(
@@ -104,16 +114,49 @@ class SheetState:
         return self.taken.of(self.groups) if self.bodies is None else self.bodies
 
 
+def fill_open_outlines(state: SheetState) -> SheetState | None:
+    """Propose figures whose outlines have gaps, with their insides."""
+    filled, gaps = close_outlines(state.painted & ~state.ruled, state.paper, state.ring)
+    if not gaps:
+        return None
+    paper = joined((~state.painted | state.ruled) & ~filled, state.ring)
+    return replace(state, filled=filled, gaps=gaps, paper=paper, blobs=find_blobs(~paper))
+
+
 def remove_shadows(state: SheetState) -> SheetState | None:
     """Propose figures without the shadows that they cast."""
     if not len(state.main_blobs):  # specks alone cast none
         return None
     seen = state.rgba, state.ground, state.tolerance
     shadow = find_shadows(state.blobs, state.main_blobs, *seen)
+    paper = _paper(state, shadow)
+    lines = _outlines(state, shadow, paper)
+    if lines.any():  # a pencil's grey
+        shadow = shadow & ~lines
+        paper = _paper(state, shadow)
     if not shadow.any():
         return None
-    paper = joined(~state.painted | state.ruled | shadow, state.ring)
     return replace(state, shadow=shadow, paper=paper, blobs=find_blobs(~paper))
+
+
+def _paper(state: SheetState, shadow: Bool[np.ndarray, "rows columns"]) -> np.ndarray:
+    free = ~state.painted | state.ruled | shadow
+    return joined(free if state.filled is None else free & ~state.filled, state.ring)
+
+
+def _outlines(
+    state: SheetState,
+    shadow: Bool[np.ndarray, "rows columns"],
+    paper: Bool[np.ndarray, "rows columns"],
+) -> Bool[np.ndarray, "rows columns"]:
+    """Return the shadows without which much of their figure is paper: they are its outline."""
+    labels, areas = state.blobs.labels, state.blobs.areas
+    lost = np.bincount(labels[paper & ~shadow], minlength=len(areas) + 1)[1:]
+    height = float(np.median(state.blobs.boxes[state.main_blobs, 3]))
+    thick = wider_than(shadow, max(1, round(LINE * height)))
+    shaded, broad = (np.bincount(labels[m], minlength=len(areas) + 1)[1:] for m in (shadow, thick))
+    thin = broad < MOST_BROAD * shaded
+    return shadow & np.append(False, lost > np.where(thin, LEAST_LOST, MOST_LOST) * areas)[labels]
 
 
 def cut_touching_figures(state: SheetState) -> SheetState | None:
@@ -136,6 +179,7 @@ def drop_strangers(state: SheetState) -> SheetState | None:
 
 
 CORRECTIONS: Mapping[str, Callable[[SheetState], SheetState | None]] = {
+    "open outlines": fill_open_outlines,
     "shadows": remove_shadows,
     "touching figures": cut_touching_figures,
     "blocky figures": add_blocky_figures,

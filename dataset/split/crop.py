@@ -25,11 +25,13 @@ class Crop:
         box: (x, y, width, height) in the sheet, with a margin.
         solid: what the figure covers with all that it encloses.
         enclosed: background-coloured pixels within.
+        filled: those of them that an open outline encloses; None: of none.
     """
 
     box: Box
     solid: Bool[np.ndarray, "height width"]
     enclosed: Bool[np.ndarray, "height width"]
+    filled: Bool[np.ndarray, "height width"] | None = None
 
 
 def found_crops(
@@ -113,10 +115,13 @@ def _crop(
     if cells is not None:
         own = _own_pixels(cells, number, found.cell_px, box)
     paper = in_pixels(found.paper, found.cell_px, box)
+    filled = None if found.filled is None else in_pixels(found.filled, found.cell_px, box)
     if found.cell_px > 1:
-        paper = joined(~drawn, paper & ~drawn)
+        free = ~drawn if filled is None else ~drawn & ~filled
+        paper = joined(free, paper & free)
     solid = own & ~paper & ~in_pixels(found.shadow, found.cell_px, box)
-    return Crop(box, solid, solid & ~drawn)
+    enclosed = solid & ~drawn
+    return Crop(box, solid, enclosed, None if filled is None else enclosed & filled)
 
 
 def _tight(crop: Crop, shape: tuple[int, ...], margin: int) -> Crop | None:
@@ -132,7 +137,9 @@ def _tight(crop: Crop, shape: tuple[int, ...], margin: int) -> Crop | None:
     pad = ((before_y, after_y), (before_x, after_x))
     window = slice(top, top + height), slice(left, left + width)
     box = x - before_x, y - before_y, width + before_x + after_x, height + before_y + after_y
-    return Crop(box, np.pad(crop.solid[window], pad), np.pad(crop.enclosed[window], pad))
+    solid, enclosed = np.pad(crop.solid[window], pad), np.pad(crop.enclosed[window], pad)
+    filled = None if crop.filled is None else np.pad(crop.filled[window], pad)
+    return Crop(box, solid, enclosed, filled)
 
 
 def _own_pixels(

@@ -23,11 +23,14 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from toonset.dataset.split.background import difference
-from toonset.raster import depth_inside, dilate, erode
+from toonset.dataset.split.open_outlines import LEAST_POCKET, LINE, line_walls
+from toonset.raster import depth_inside, dilate, distance_to, erode, sized_parts, wider_than
+from toonset.view import over_white
 
 LEAST_HOLE_PX = 9
 LEAST_ISLAND_PX = 4
-LINE_ART = 0.5  # of the figure: more of it in the background's colour is a line drawing
+LINE_ART = 0.5  # of the figure without its lines: more in the background's colour is a line drawing
+EDGE_PX = 2.0  # of a figure on transparency: its soft edge
 INK_LUMA = 64  # of 255: darker is ink
 HEAD = 0.25  # of the figure's height from its top: no holes there
 SOFT_SHADE = 48  # levels from the background: nearer is a shade of it
@@ -95,6 +98,7 @@ def open_holes(
     background: UInt8[np.ndarray, "height width 3"],
     outline: BorderLook,
     least_share: float,
+    filled: Bool[np.ndarray, "height width"] | None = None,
 ) -> tuple[Bool[np.ndarray, "height width"], int]:
     """Return the figure without its holes, and how many there were.
 
@@ -105,10 +109,13 @@ def open_holes(
         background: that colour behind the crop.
         outline: what the outlines of all figures of the sheet look like.
         least_share: of the figure's area; a smaller patch is not a hole.
+        filled: what an open outline encloses; no hole.
     """
     area = int(mask.sum())
-    if not enclosed.any() or int(enclosed.sum()) > LINE_ART * area:
+    if not enclosed.any() or is_line_art(mask, enclosed):
         return mask, 0
+    if filled is not None:
+        enclosed = enclosed & ~filled
     contrast, luma = (
         difference(rgb, background),
         cv2.cvtColor(np.ascontiguousarray(rgb), cv2.COLOR_RGB2GRAY),
@@ -135,6 +142,70 @@ def open_holes(
             result[window] &= ~patch
             opened += 1
     return result, opened
+
+
+def is_line_art(
+    mask: Bool[np.ndarray, "height width"], enclosed: Bool[np.ndarray, "height width"]
+) -> bool:
+    """Return whether a figure is lines around paper, with few painted patches."""
+    tall = int(mask.any(axis=1).sum())
+    reach = max(1, round(LINE * tall))
+    painted = wider_than(mask & ~enclosed, reach)
+    paper = int(enclosed.sum())
+    return paper > LINE_ART * (paper + int(painted.sum()))
+
+
+def unpainted_patches(
+    mask: Bool[np.ndarray, "height width"],
+    enclosed: Bool[np.ndarray, "height width"],
+    filled: Bool[np.ndarray, "height width"] | None,
+) -> Bool[np.ndarray, "height width"]:
+    """Return what is left unpainted of a figure on transparency.
+
+    All that lines enclose if it is a line drawing; else large patches that lines alone close off
+    from the outside, as they do clothes and not the gap between arm and body.
+
+    Args:
+        mask: the figure with everything that it encloses.
+        enclosed: its transparent patches.
+        filled: those that an open outline encloses; None: none.
+    """
+    if not enclosed.any() or is_line_art(mask, enclosed):
+        return enclosed
+    tall = float(mask.any(axis=1).sum())
+    found = np.zeros_like(mask) if filled is None else filled.copy()
+    numbers, areas = sized_parts(enclosed & ~found, connectivity=4)
+    drawn, large = mask & ~enclosed, areas >= LEAST_POCKET * tall**2
+    large[0] = False
+    return found | (large & line_walls(numbers, len(areas), drawn, ~mask, tall))[numbers]
+
+
+def with_paper(
+    rgba: UInt8[np.ndarray, "height width 4"],
+    mask: Bool[np.ndarray, "height width"],
+    enclosed: Bool[np.ndarray, "height width"],
+    filled: Bool[np.ndarray, "height width"] | None,
+) -> tuple[UInt8[np.ndarray, "height width 4"], bool]:
+    """Return a figure with white paper under its unpainted patches, and whether it has any.
+
+    There the soft edges of lines become opaque, too; in a line drawing all but its outermost edge.
+
+    Args:
+        rgba: the figure on transparency.
+        mask: where it is, with everything that it encloses.
+        enclosed: its transparent patches.
+        filled: those that an open outline encloses; None: none.
+    """
+    patches = unpainted_patches(mask, enclosed, filled)
+    if not patches.any():
+        return rgba, False
+    away = distance_to(~mask)
+    inner = away > EDGE_PX if is_line_art(mask, enclosed) else distance_to(patches) < away
+    under = patches | (mask & inner & (rgba[..., 3] < 255))
+    result = rgba.copy()
+    rgb = np.rint(255 * over_white(rgba[under][None])[0])
+    result[under] = np.column_stack([rgb, np.full(len(rgb), 255)]).astype(np.uint8)
+    return result, True
 
 
 def _is_behind_a_limb(

@@ -18,6 +18,7 @@ from toonset.dataset.split.corrections import CORRECTIONS, LIKELIEST, SheetState
 from toonset.dataset.split.figures.blobs import Blobs
 from toonset.dataset.split.figures.grouping import Grouping, group_blobs
 from toonset.dataset.split.figures.rows import Group
+from toonset.dataset.split.open_outlines import Gap
 from toonset.dataset.split.ruled_lines import Line, find_lines, line_pixels
 from toonset.dataset.split.touching.cut import Cut
 from toonset.errors import SheetError
@@ -43,6 +44,8 @@ class SheetLayout:
         cuts: where touching figures were cut apart.
         groups: equal figures, the likeliest turnaround first.
         taken: which of them are the views.
+        filled: (rows, columns) cells of background within outlines that are open; None: of none.
+        gaps: where those are open.
     """
 
     cell_px: int
@@ -55,6 +58,8 @@ class SheetLayout:
     cuts: tuple[Cut, ...]
     groups: tuple[Group, ...]
     taken: Taken
+    filled: Bool[np.ndarray, "rows columns"] | None
+    gaps: tuple[Gap, ...]
 
 
 def find_paint(
@@ -119,6 +124,7 @@ def find_layout(
     return SheetLayout(
         *(cell, state.paper, state.shadow, state.ruled, tuple(lines)),
         *(state.blobs, grouping, state.cuts, state.groups, state.taken),
+        *(state.filled, state.gaps),
     )
 
 

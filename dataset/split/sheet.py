@@ -24,7 +24,7 @@ from toonset.dataset.split.corrections import LIKELIEST, Taken
 from toonset.dataset.split.crop import Crop, boxed_crops, found_crops, grid_crops
 from toonset.dataset.split.figures.blobs import as_box
 from toonset.dataset.split.figures.text_and_swatches import words
-from toonset.dataset.split.holes import BorderLook, open_holes, outline_look
+from toonset.dataset.split.holes import BorderLook, open_holes, outline_look, with_paper
 from toonset.dataset.split.matting import cut_out, edge_softness_px
 from toonset.dataset.split.pages import Pages, find_pages
 from toonset.dataset.split.segment import SheetLayout, find_layout, find_paint
@@ -189,7 +189,7 @@ def split_picture(
     found = find_layout(rgba, paint, ground, options.without, options.taken)
     _check(found, ground, options)
     crops = _crops(found, paint, options)
-    views, holes = _views(rgba, ground, crops, options)
+    views, holes, papered = _views(rgba, ground, crops, options)
     swatches = _swatches(found)
     return Segmentation(
         tuple(views),
@@ -200,7 +200,7 @@ def split_picture(
         () if by_hand else _left_out(found),
         (
             *_of_picture(pages, residual),
-            *_remarks(ground, found, holes, 0 if by_hand else len(found.cuts)),
+            *_remarks(ground, found, holes, papered, 0 if by_hand else len(found.cuts)),
         ),
         swatches,
         () if by_hand else _groups(found),
@@ -273,11 +273,17 @@ def _window(picture: np.ndarray, box: Box) -> np.ndarray:
 
 def _views(
     rgba: np.ndarray, ground: Background, crops: list[Crop], options: SheetOptions
-) -> tuple[list[View], int]:
-    """Return the views and the number of opened holes."""
-    holes = 0
+) -> tuple[list[View], int, int]:
+    """Return the views, the number of opened holes, and how many views were given paper."""
+    holes, papered = 0, 0
     if ground.rgb is None:
         cuts = [np.where(c.solid[..., None], _window(rgba, c.box), np.uint8(0)) for c in crops]
+        each = [
+            with_paper(cut, crop.solid, crop.enclosed, crop.filled)
+            for cut, crop in zip(cuts, crops, strict=True)
+        ]
+        cuts = [cut for cut, _ in each]
+        papered = sum(changed for _, changed in each)
     else:
         papers = [ground.colors(crop.box) for crop in crops]
         softness = _softness(rgba, ground, crops)
@@ -289,14 +295,18 @@ def _views(
         for crop, paper in zip(crops, papers, strict=True):
             rgb = _window(rgba, crop.box)[..., :3]
             solid, opened = open_holes(
-                rgb, crop.solid, crop.enclosed, paper, look, options.least_hole
+                *(rgb, crop.solid, crop.enclosed, paper), *(look, options.least_hole, crop.filled)
             )
             cuts.append(cut_out(rgb, solid, paper, ground.tolerance, softness))
             holes += opened
-    return [
-        _view(cut, crop.box, f"{i:03d}.png")
-        for i, (cut, crop) in enumerate(zip(cuts, crops, strict=True))
-    ], holes
+    return (
+        [
+            _view(cut, crop.box, f"{i:03d}.png")
+            for i, (cut, crop) in enumerate(zip(cuts, crops, strict=True))
+        ],
+        holes,
+        papered,
+    )
 
 
 def _softness(rgba: np.ndarray, ground: Background, crops: list[Crop]) -> int:
@@ -372,7 +382,9 @@ def _of_picture(pages: Pages | None, residual: int) -> tuple[str, ...]:
     return tuple(said)
 
 
-def _remarks(ground: Background, found: SheetLayout, holes: int, cuts: int) -> tuple[str, ...]:
+def _remarks(
+    ground: Background, found: SheetLayout, holes: int, papered: int, cuts: int
+) -> tuple[str, ...]:
     said = [] if ground.kind in ("plain", "transparent") else [str(ground)]
     kinds = found.grouping.kinds
     said += [f"{NAMES[kind]} left out ({kinds.count(kind)})" for kind in NAMES if kind in kinds]
@@ -385,6 +397,12 @@ def _remarks(ground: Background, found: SheetLayout, holes: int, cuts: int) -> t
         said.append("shadows on the ground were left out")
     if cuts:
         said.append(f"touching figures were cut apart ({cuts})")
+    closed = [gap for gap in found.gaps if gap.closed]
+    if closed:
+        widest = max(gap.width for gap in closed) * found.cell_px
+        said.append(f"open outlines were closed ({len(closed)} gaps, up to {widest:.0f} px wide)")
+    if papered:
+        said.append(f"unpainted patches within figures became white paper ({papered} views)")
     if holes:
         said.append(f"enclosed patches in the background's colour became holes ({holes})")
     return tuple(said)

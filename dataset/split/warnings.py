@@ -9,9 +9,11 @@ from toonset.dataset.split.background import SURE_ENOUGH, Background
 from toonset.dataset.split.figures.blobs import Blobs, shared_colors
 from toonset.dataset.split.figures.grouping import LEAST_PART
 from toonset.dataset.split.figures.rows import LOWEST
+from toonset.dataset.split.open_outlines import LINE, Gap
 from toonset.dataset.split.pages import Pages
-from toonset.dataset.split.segment import SheetLayout
+from toonset.dataset.split.segment import SheetLayout, figure_cells
 from toonset.dataset.split.watermark import Watermark
+from toonset.raster import sized_parts, wider_than
 from toonset.view import View
 
 NEARLY_A_VIEW = 0.5  # of the views' height: something left out that may be a small one
@@ -21,6 +23,9 @@ BROAD = 1.15  # times its own height: wider than arms reach
 NEARER = 1.2  # times the gap between parts and their bodies: so near a part may be another's
 AS_LIKELY = 0.6  # of the merit of the group that was taken: another may be the turnaround
 WHOLE = 0.6  # of the sheet that one view's box covers though there is text beside it
+WIDE_GAP = 0.05  # of the figure's height: a wider gap may be meant
+LARGE_POCKET = 0.01  # of the figure's squared height: so much more or less changes it
+MOST_STROKES = 0.08  # of a view: with more it is hollow somewhere
 WIDE = 1.8  # times the median width: two figures that touch
 
 
@@ -57,6 +62,7 @@ def figure_warnings(
     """Return a line for every cut in doubt, every wide view, all left out that may be views."""
     return (
         *_cuts(found),
+        *_open_outlines(found, views),
         *_wide_views(views),
         *_whole_page(found, views, rgba),
         *_near_parts(found, views),
@@ -75,6 +81,46 @@ def _cuts(found: SheetLayout) -> list[str]:
             f"through {100 * cut.crossed:.1f} % of their height: look whether the cut is right"
         )
     return said
+
+
+def _open_outlines(found: SheetLayout, views: list[View]) -> list[str]:
+    """Return a line for every view whose outline is open, or was closed over a wide gap."""
+    said, number, cell = list[str](), figure_cells(found), found.cell_px
+    for figure, view in enumerate(views):
+        own = [
+            gap for gap in found.gaps if _is_worth_a_word(gap) and _is_beside(number, gap, figure)
+        ]
+        where = f"the outline of {view.name} is open at"
+        if own:
+            gap = max(own, key=lambda gap: gap.area)
+            wide = f" over {gap.width * cell:.0f} px; it was closed there" if gap.closed else ""
+            said.append(f"{where} {gap.x * cell}, {gap.y * cell}{wide}")
+        elif (place := _strokes(view)) is not None:
+            said.append(f"{where} {place[0]}, {place[1]}; beside it the view is lines alone")
+    return said
+
+
+def _is_worth_a_word(gap: Gap) -> bool:
+    far = gap.width > WIDE_GAP * gap.height and gap.area > LARGE_POCKET * gap.height**2
+    return far or not gap.closed
+
+
+def _is_beside(number: np.ndarray, gap: Gap, figure: int) -> bool:
+    reach = max(2, round(gap.width))
+    rows = slice(max(gap.y - reach, 0), gap.y + reach + 1)
+    columns = slice(max(gap.x - reach, 0), gap.x + reach + 1)
+    return bool((number[rows, columns] == figure + 1).any())
+
+
+def _strokes(view: View) -> tuple[int, int] | None:
+    """Return where in the sheet the largest stroke of a view is that is lines for a good part."""
+    strokes = view.mask & ~wider_than(view.mask, max(1, round(LINE * view.figure_box[3])))
+    if np.count_nonzero(strokes) < MOST_STROKES * np.count_nonzero(view.mask):
+        return None
+    numbers, areas = sized_parts(strokes)
+    rows, columns = np.nonzero(numbers == 1 + int(areas[1:].argmax()))
+    middle = len(rows) // 2
+    return view.box[0] + int(columns[middle]), view.box[1] + int(rows[middle])
 
 
 def _wide_views(views: list[View]) -> list[str]:

@@ -27,5 +27,7 @@ def test_a_plain_sheet_needs_none() -> None:
 
 def test_a_correction_that_is_none_is_refused() -> None:
     rgba = make_messy_sheet(0, ["plain"]).rgba
-    with pytest.raises(SheetError, match="no correction 'shade'; choose from shadows, touching"):
+    with pytest.raises(
+        SheetError, match="no correction 'shade'; choose from open outlines, shadows"
+    ):
         split_picture(rgba, SheetOptions(without=("shade",)))
