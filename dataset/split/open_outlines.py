@@ -16,7 +16,8 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from toonset.dataset.split.figures.blobs import find_blobs, find_main_blobs
+from toonset.dataset.split.figures.blobs import find_blobs
+from toonset.dataset.split.figures.rows import find_groups
 from toonset.raster import dilate, sized_parts, wider_than
 
 SEEN_AT = 280  # cells of a figure's height: outlines of larger figures are closed on coarser ones
@@ -154,8 +155,8 @@ def _figure_height(solid: Mask) -> float:
     height = 0.0
     for _ in range(3):
         blobs = find_blobs(dilate(solid, reach))
-        bodies = find_main_blobs(blobs)
-        height = float(np.median(blobs.boxes[bodies, 3])) - 2 * reach if len(bodies) else 0.0
+        groups = find_groups(blobs)
+        height = groups[0].height - 2 * reach if groups else 0.0
         if round(JOIN * height) <= reach:
             break
         reach = round(JOIN * height)
