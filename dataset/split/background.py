@@ -237,7 +237,9 @@ def _steps(
 ) -> Background | None:
     """Return the background of several zones, if the border is in several."""
     rgb = np.ascontiguousarray(rgba[..., :3])
-    return _of_plate("stepped", fit_steps(rgb, ring_of(*rgb.shape[:2], inset)), places, colors)
+    return _of_plate(
+        "stepped", fit_steps(rgb, ring_of(rgb.shape[0], rgb.shape[1], inset)), places, colors
+    )
 
 
 def _of_plate(
