@@ -27,8 +27,7 @@ LOOKED_FOR = 0.05  # the same of gaps that are said, not closed
 WALL = 0.03  # of the figure's height, and two cells: no line is thicker
 LEAST_POCKET = 0.002  # of the figure's squared height: smaller pockets are corners of the outline
 LINE = 0.012  # of the figure's height: half of the thickest line
-DOUBTFUL = 0.6  # of the least share and length of lines: with less a pocket is a real gap
-DOUBTFUL_POCKET = 0.01  # of the figure's squared height: smaller ones are not worth a word
+FIRST_LOOK = 0.6  # of the least length: the largest ball touches fewer of the walls
 JOIN = 0.012  # of the figure's height: across gaps so wide lines are of one figure
 STEP = 1.2  # times the ball before: the next
 
@@ -178,7 +177,7 @@ def _close(drawn: Mask, outside: Mask, seeds: Mask, height: float) -> tuple[Mask
     reached = _reached(room, outside, seeds, least.looked_for * height)
     numbers, areas = sized_parts(outside & ~reached, connectivity=4)
     _, facing = _walls(numbers, len(areas), drawn, reached, height)
-    shortest = DOUBTFUL * least.length * height
+    shortest = FIRST_LOOK * least.length * height
     for number in range(1, len(areas)):
         if areas[number] < least.area * height**2 or facing[number] < shortest:
             continue
@@ -218,29 +217,23 @@ def _smallest(
     least: Evidence,
 ) -> list[tuple[Mask, Gap]]:
     """Return the parts of a pocket, each cut off by the smallest ball that does not enter it."""
-    found, doubtful = list[tuple[Mask, Gap]](), list[tuple[Mask, Gap]]()
-    left, ball = pocket, 1.0
+    found, left, ball = list[tuple[Mask, Gap]](), pocket, 1.0
     while ball < least.looked_for * height * STEP and left.any():
         within = _reached(room, left | reached, reached, min(ball, least.looked_for * height))
         numbers, areas = sized_parts(left & ~within, connectivity=4)
         length, facing = _walls(numbers, len(areas), drawn, within, height)
         for number in range(1, len(areas)):
             part = numbers == number
-            if areas[number] < least.area * height**2 or room[part].max() < least.roomier * ball:
+            asked = least if ball <= least.ball * height else OF_PAINT
+            if areas[number] < asked.area * height**2 or room[part].max() < asked.roomier * ball:
                 continue
-            if least.holds(length[number], facing[number], height):
+            if asked.holds(length[number], facing[number], height):
                 gap = _gap(part, within, 2 * ball - 1, height)
                 found.append((part, replace(gap, closed=ball <= least.ball * height)))
                 left = left & ~part
-            elif areas[number] >= DOUBTFUL_POCKET * height**2 and least.holds(
-                length[number], facing[number] / DOUBTFUL, height
-            ):
-                doubtful.append((part, _gap(part, within, 2 * ball - 1, height)))
         room = np.where(left | reached, room, 0)
         ball *= STEP
-    still = [(part & left, replace(gap, closed=False)) for part, gap in doubtful]
-    large = [(part, gap) for part, gap in still if part.sum() > gap.area / 2]
-    return found + large[-1:]
+    return found
 
 
 def _gap(part: Mask, outside: Mask, width: float, height: float) -> Gap:

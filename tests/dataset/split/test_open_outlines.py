@@ -19,7 +19,7 @@ def _lines(gaps: Gaps = (), figures: int = 3) -> tuple[np.ndarray, np.ndarray]:
     for left in range(0, 150 * figures, 150):
         body = [[60, 120], [120, 120], [140, 200], [130, 270], [100, 270], [92, 210], [88, 210]]
         body += [[80, 270], [50, 270], [40, 200]]
-        outline = np.array(body) + [left, 0]
+        outline = np.add(body, (left, 0))
         for canvas, thickness in ((ink, 3), (true, -1)):
             cv2.circle(canvas, (left + 90, 80), 42, 255, thickness)
             if thickness < 0:
