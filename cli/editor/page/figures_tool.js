@@ -11,6 +11,7 @@ import { clamp } from "../../../nerf/viewer/page/state.js";
 /** @typedef {import("./types.js").Tool} Tool */
 
 const GRIP = 12; // pixels of the screen round a corner or an edge
+const LOWEST = 17; // pixels of the screen: the letter of a lower patch would cover its neighbours
 const LEAST = 8; // pixels of the sheet: smaller is no figure
 const SHADES = { figure: "#12639c", off: "#b02318", left: "#575b61" };
 
@@ -131,8 +132,8 @@ export function createFiguresTool(model, picture, colorAt) {
   function showLeftOut() {
     const items = leftOut().map(({ box, kind }, i) => {
       const word = `Take “${letterOf(i)}”, ${KINDS[kind] ?? kind}, as a figure`;
-      const shown = isDrawing({ kind }) ? [thumbnail(picture, [[box]]), letterOf(i)] : [word];
-      const button = element("button", { type: "button", "aria-label": word, title: word }, ...shown);
+      const shown = thumbnail(picture, [[box]]);
+      const button = element("button", { type: "button", "aria-label": word, title: word }, shown, letterOf(i));
       button.addEventListener("click", () => add(box));
       return element("li", {}, button);
     });
@@ -158,7 +159,7 @@ export function createFiguresTool(model, picture, colorAt) {
       context.textBaseline = "top";
       leftOut().forEach(({ box }, i) => {
         outline(context, box, px, SHADES.left, [4, 3]);
-        tag(context, box, px, SHADES.left, letterOf(i)); // its kind would cover the next one's
+        if (box[3] > LOWEST * px) tag(context, box, px, SHADES.left, letterOf(i));
       });
       model.figures.forEach((figure, i) => {
         const { box, said } = figure;

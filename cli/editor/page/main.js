@@ -2,7 +2,7 @@
 
 import { createCamerasTool } from "./cameras_tool.js";
 import { createCards } from "./cards.js";
-import { createFiguresTool } from "./figures_tool.js";
+import { createFiguresTool, nameOf } from "./figures_tool.js";
 import { createGroups } from "./groups.js";
 import { createKeeper } from "./keeper.js";
 import { createModel } from "./model.js";
@@ -81,7 +81,7 @@ async function start({ scene, corrections, busy, error }, keeper) {
   };
   shown.listen(showMode);
   showMode();
-  Object.assign(globalThis, { toonset: { model: shown, sheet, cameras } });
+  Object.assign(globalThis, { toonset: { model: shown, sheet, cameras, nameOf } });
 }
 
 /** @param {HTMLImageElement} picture @param {number[]} size @returns {(at: number[]) => string} */
