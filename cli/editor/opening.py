@@ -43,7 +43,13 @@ ALL = Changed(cut=True, cameras=True, palette=True)
 MESH = "mesh"  # role of a bundle's input
 BESIDE_MESH = ("points of the mesh", "landmarks", "init")
 MANNEQUIN_MADE = "mannequin"  # option: what a body made by code looks like
-CUT_BY = ("grid", "background", "drop")  # options of `calibrate` that a bundle records
+CUT_BY = (
+    "grid",
+    "background",
+    "drop",
+    "group",
+    "outfit",
+)  # options of `calibrate` that a bundle records
 
 MeshOption = Path | Literal["none"] | None
 
@@ -242,6 +248,8 @@ def _as_it_was_cut(subject: Subject, found: CalibrationFile) -> tuple[Sheet, dic
         corrections["background"] = hex_of(sheet.split.sources[0].background or (255, 255, 255))
     if options.keys() & {"grid", "drop"}:
         corrections["boxes"] = boxes
+    else:
+        corrections |= {key: options[key] for key in ("group", "outfit") if key in options}
     said = [
         {"box": box, "label": label}
         for box, label in zip(boxes, labels, strict=False)

@@ -29,7 +29,7 @@ from toonset.mesh import Mesh
 from toonset.palette.extract import options_of
 from toonset.palette.palette import MAX_COLORS
 from toonset.palette.pixels.ink_lines import find_contours
-from toonset.view import SHEET, InputFile, Origin
+from toonset.view import SHEET, InputFile, Origin, View
 from toonset.write import exchange_folders, write_bytes, write_json
 
 CORRECTIONS = "corrections.json"
@@ -37,7 +37,7 @@ NOTHING: dict[str, Any] = {"version": 1}
 LEAST_SHARE = 0.05  # of a paint, as `palette` has it
 BY_HAND = "corrections"  # the file's role among a bundle's inputs
 RUN = "run"  # a trained field: it stays, whatever becomes of the cameras
-CUT, CAMERAS, PALETTE = ("background", "boxes"), "views", "palette"
+CUT, CAMERAS, PALETTE = ("background", "boxes", "group", "outfit"), "views", "palette"
 
 Body = Mesh | Literal["none"] | None
 
@@ -82,7 +82,7 @@ class DrawnSheet:
     """A sheet's drawings, and what was found in them: both stay until they are cut anew.
 
     Attributes:
-        sheet: the drawings as a person calls them now.
+        sheet: the drawings, labelled as the sheet itself says.
         cues: what they show, whatever a person calls them.
     """
 
@@ -115,23 +115,31 @@ def file_of(corrections: dict[str, Any]) -> bytes:
 def cut_sheet(
     sheet: Path, corrections: dict[str, Any], workshop: Path
 ) -> tuple[Sheet, Path | None]:
-    """Return the corrected drawings and their corrections file; None without corrections."""
+    """Return the drawings, cut but not labelled as corrections say, and the corrections file.
+
+    There is no file without corrections.
+    """
     if corrections == NOTHING:
         return split_sheet(sheet), None
     file = workshop / CORRECTIONS
+    views = [
+        {k: view[k] for k in ("box", "exclude") if k in view}
+        for view in corrections.get(CAMERAS, ())
+    ]
+    write_bytes(file, file_of(corrections | {CAMERAS: views}))
+    found = split_sheet(sheet, corrections=file)
     write_bytes(file, file_of(corrections))
-    return split_sheet(sheet, corrections=file), file
+    return found, file
 
 
-def _said_anew(sheet: Sheet, file: Path) -> Sheet:
-    """Return drawings that stay as they are cut, labelled as a file of corrections says."""
+def _labelled(sheet: Sheet, file: Path) -> tuple[View, ...]:
+    """Return drawings as they are cut, labelled as a file of corrections says."""
     files = (*(one for one in sheet.files if one.role != BY_HAND), InputFile.of(BY_HAND, file))
     origin = Origin(files, sheet.options)
-    views = tuple(
-        replace(view, label="" if said is None else said.label, origin=origin)
+    return tuple(
+        replace(view, label=said.label if said and said.label else view.label, origin=origin)
         for view, said in zip(sheet.views, Given.of(file).of_views(sheet.views), strict=True)
     )
-    return replace(sheet, split=replace(sheet.split, views=views), files=files)
 
 
 def make_bundle(
@@ -164,10 +172,10 @@ def make_bundle(
     else:
         file = subject.workshop / CORRECTIONS
         write_bytes(file, file_of(corrections))
-        drawn = replace(before, sheet=_said_anew(before.sheet, file))
+        drawn = before
+    views = drawn.sheet.views if file is None else _labelled(drawn.sheet, file)
     hints = Hints(corrections=file)
-    views, body = drawn.sheet.views, subject.body
-    found = calibrate(views, body, hints, progress=progress, cues=drawn.cues)
+    found = calibrate(views, subject.body, hints, progress=progress, cues=drawn.cues)
     save_bundle(new, found)
     if old.is_dir():
         _take_along(old, new)

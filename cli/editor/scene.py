@@ -69,11 +69,11 @@ def scene_of(folder: Path, sheet: Sheet) -> dict[str, Any]:
             "background": None if ground is None else hex_of(ground),
             "notes": list(sheet.warnings),
         },
-        "leftOut": left_out_of(sheet),
         "verdict": {"state": found.verdict, "reason": for_page(found.reason)},
         "views": [
             _view(folder, view, said) for view, said in zip(sheet.views, found.views, strict=True)
         ],
+        **seen_on(sheet),
         "mannequin": None if mesh is None else _mannequin(mesh),
         "palette": _palette(member(folder, PALETTE)),
     }
@@ -84,10 +84,20 @@ def for_page(reason: str) -> str:
     return re.sub(r" \(--[^)]*\)", "", reason)
 
 
-def left_out_of(sheet: Sheet) -> list[dict[str, Any]]:
-    """Return what the splitter left out of a sheet."""
-    left = sheet.split.sources[0].left_out
-    return [{"box": list(one.box), "kind": one.kind} for one in left]
+def seen_on(sheet: Sheet) -> dict[str, Any]:
+    """Return the groups of figures that the splitter saw on a sheet, and what it left out."""
+    source = sheet.split.sources[0]
+    return {
+        "groups": [
+            {
+                "rows": [list(map(list, row)) for row in one.rows],
+                "why": one.why,
+                "outfits": one.outfits,
+            }
+            for one in source.groups
+        ],
+        "leftOut": [{"box": list(one.box), "kind": one.kind} for one in source.left_out],
+    }
 
 
 def sheet_url(path: Path) -> str:
@@ -108,6 +118,7 @@ def _view(folder: Path, view: View, said: ViewRecord) -> dict[str, Any]:
         "name": said.name,
         "box": list(view.figure_box),
         "crop": list(view.box),
+        "caption": view.label,
         "verdict": said.verdict,
         "reason": for_page(said.reason),
         "sigma": {"yaw": said.sigma.yaw_deg, "elevation": said.sigma.elevation_deg},

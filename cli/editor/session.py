@@ -27,7 +27,7 @@ from toonset.cli.editor.refit import (
     parts_changed,
     put_in_place,
 )
-from toonset.cli.editor.scene import left_out_of, page_of, scene_of, sheet_url
+from toonset.cli.editor.scene import page_of, scene_of, seen_on, sheet_url
 from toonset.dataset.split_folder.corrections import parse_corrections
 from toonset.dataset.split_folder.load import split_sheet
 from toonset.errors import SheetError, ToonsetError, one_line
@@ -79,7 +79,7 @@ class Session:
     stopped: bool = False
     picture: str = field(init=False)
     _tried: dict[str, Any] = field(init=False)
-    _left_out: list[dict[str, Any]] | None = None  # of the sheet as it is cut without boxes
+    _seen: dict[str, Any] = field(default_factory=dict)  # on the sheet, as cut without boxes
     _busy: bool = False
     _thread: threading.Thread = field(init=False)
     _news: threading.Condition = field(default_factory=threading.Condition)
@@ -166,10 +166,11 @@ class Session:
         """Make the page's scene, and the page as a file of its own."""
         scene = scene_of(self.subject.folder, self.drawn.sheet)
         if not self.fitted.get("boxes"):
-            self._left_out = scene["leftOut"]
-        elif self._left_out is None:  # who draws boxes wants to see what else there is
-            self._left_out = left_out_of(split_sheet(self.subject.sheet))
-        scene["leftOut"] = self._left_out
+            self._seen = seen_on(self.drawn.sheet)
+        elif not self._seen:  # who draws boxes wants to see what else there is
+            self._seen = seen_on(split_sheet(self.subject.sheet))
+        taken = {"group": self.fitted.get("group", 1), "outfit": self.fitted.get("outfit", "")}
+        scene |= self._seen | taken
         with self._news:
             self.scene = scene
             self._tell_all()

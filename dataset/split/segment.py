@@ -130,11 +130,11 @@ def find_layout(
 
 def _not_there(taken: Taken, groups: tuple[Group, ...]) -> str:
     if taken.group >= len(groups):
-        return f"--group: the sheet has {len(groups)} groups of figures, numbered from 1"
+        return f"there is no such group: the sheet has {len(groups)} of them, numbered from 1"
     rows = len(groups[taken.group].rows)
     if rows == 1:
-        return "--outfit: the group has one row of figures; leave --outfit away"
-    return f"--outfit: the group has {rows} rows of figures, A to {chr(ord('A') + rows - 1)}"
+        return "there is no such outfit: the group has one row of figures"
+    return f"there is no such outfit: the group has {rows} rows, A to {chr(ord('A') + rows - 1)}"
 
 
 def in_cells(

@@ -52,11 +52,9 @@ class Given:
         Raises:
             UsageError: both say where figures are, what is left out, or what views show.
         """
+        key = self.content.figures_key
         said = {
-            "boxes": ("boxes", self.content.boxes),
-            "grid": ("boxes", self.content.boxes),
-            "group": ("boxes", self.content.boxes),
-            "outfit": ("boxes", self.content.boxes),
+            **dict.fromkeys(("boxes", "grid", "group", "outfit"), (key, key)),
             "background": ("background", self.content.background),
             "drop": ("views.exclude", any(view.exclude for view in self.content.views)),
             "views": ("views.label", any(view.label for view in self.content.views)),

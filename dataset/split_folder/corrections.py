@@ -2,7 +2,7 @@
 
     {"version": 1,
      "sheet": {"name": "sheet.png", "sha256": "...", "size": [1600, 400]},
-     "background": "#ffffff", "boxes": [[12, 8, 120, 300], ...],
+     "background": "#ffffff", "boxes": [[12, 8, 120, 300], ...],  (or "group": 2, "outfit": "B")
      "views": [{"box": [12, 8, 120, 300], "label": "front", "exclude": true, "lock": true,
                 "camera": {"yaw": 30, "elevation": 5, "roll": 0, "scale": 310.2,
                            "middle": [72, 158]},
@@ -140,6 +140,8 @@ class Corrections:
         sheet: which one; None for the one that is given.
         background: the paper's colour; "" to find it.
         boxes: of the figures, in this order; empty to find them.
+        group: number of the group of figures, from 1; None: the likeliest turnaround.
+        outfit: letter of a row of the group, "A" is the uppermost; "": all rows.
         views: what was said of single views.
         palette: what was said of the colours.
     """
@@ -150,8 +152,15 @@ class Corrections:
     sheet: SheetName | None = None
     background: Paper = ""
     boxes: tuple[FigureBox, ...] = ()
+    group: Annotated[int, Field(ge=1)] | None = None
+    outfit: Annotated[str, Field(pattern="^[A-Z]?$")] = ""
     views: tuple[ViewCorrection, ...] = ()
     palette: PaletteCorrections = field(default_factory=PaletteCorrections)
+
+    @property
+    def figures_key(self) -> str:
+        """Return the key that says which figures count; "" where none does."""
+        return next((key for key in ("boxes", "group", "outfit") if getattr(self, key)), "")
 
 
 _SCHEMA: TypeAdapter[Corrections] = TypeAdapter(Corrections)
@@ -196,6 +205,9 @@ def parse_corrections(data: bytes, where: str) -> Corrections:
 
 def _check(found: Corrections, where: str) -> None:
     """Refuse what contradicts itself."""
+    if found.boxes and (found.group or found.outfit):
+        other = "group" if found.group else "outfit"
+        raise SheetError(f"{where}: boxes and {other} both say which figures count; drop one")
     first: dict[Box, int] = {}
     for number, view in enumerate(found.views):
         key = f"{where}: views.{number}"

@@ -116,7 +116,7 @@ class Cutting:
             "background": self.background,
             "grid": self.grid,
             "group": self.group or "",
-            "outfit": self.outfit,
+            "outfit": self.outfit.strip().upper(),
         }
         return {name: value for name, value in named.items() if value}
 

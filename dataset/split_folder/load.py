@@ -135,9 +135,9 @@ def _load(paths: Sequence[Path], cutting: Cutting, given: Given | None) -> Sheet
     places, skipped = sheet_places(paths)
     cut = _options_per_sheet(places, cutting)
     where = "--boxes"
-    if given is not None and (given.content.boxes or given.content.background):
+    if given is not None:
         cut = _as_corrected(places, cut, given)
-        where = f"{given.path}: boxes"
+        where = f"{given.path}: boxes" if given.content.boxes else where
     parts = [
         _of_split_folder(place) if options is None else _of_sheet(place, options, where)
         for place, options in zip(places, cut, strict=True)
@@ -216,8 +216,10 @@ def _options_per_sheet(places: Sequence[Path], cutting: Cutting) -> list[SheetOp
 def _as_corrected(
     places: Sequence[Path], options: Sequence[SheetOptions | None], given: Given
 ) -> list[SheetOptions | None]:
-    """Return how every sheet is cut, the corrected one with its boxes and background."""
-    found = list(options)
+    """Return how every sheet is cut, the corrected one as its corrections say."""
+    said, found = given.content, list(options)
+    if not (said.figures_key or said.background):
+        return found
     number = 0
     if len(places) > 1:
         files = [i for i, place in enumerate(places) if not place.is_dir()]
@@ -227,12 +229,12 @@ def _as_corrected(
         raise SheetError(
             f"{given.path}: {places[number]} is cut already; give the sheet that it was cut from"
         )
-    paper = given.content.background
-    found[number] = replace(
-        cut,
-        boxes=given.content.boxes,
-        background_rgb=rgb_of_hex(paper, "background") if paper else cut.background_rgb,
-    )
+    if said.background:
+        cut = replace(cut, background_rgb=rgb_of_hex(said.background, "background"))
+    if said.figures_key:
+        taken = Cutting(group=said.group, outfit=said.outfit).taken
+        cut = replace(cut, boxes=said.boxes, taken=taken)
+    found[number] = cut
     return found
 
 

@@ -1,7 +1,7 @@
 // The mannequin over the drawings: dragging it turns the camera, and says how well the outlines fit.
 
 import { overlapOf, withView } from "./corrections.js";
-import { tag, topmost } from "./figures_tool.js";
+import { nameOf, tag, topmost } from "./figures_tool.js";
 import {
   bodyOf,
   boundsOf,
@@ -164,8 +164,7 @@ export function createCamerasTool(model, fits) {
         const shape = figure.said?.exclude ? null : shapeOf(figure);
         const shade = SHADE[figure.view?.verdict ?? ""];
         if (shape) drawOutline(context, shape, chosen, px, chosen ? BLUE : shade);
-        const word = figure.said?.exclude ? " left out" : "";
-        tag(context, figure.view?.crop ?? figure.box, px, chosen ? BLUE : shade, `${i + 1}${word}`);
+        tag(context, figure.view?.crop ?? figure.box, px, chosen ? BLUE : shade, nameOf(figure, i));
         if (!chosen || !shape) return;
         if (marking === "mannequin" && body) drawShaded(context, body, shape.points, shape.pose.scale);
         if (!marking) drawHandles(context, shape, px);

@@ -17,6 +17,7 @@ import { badge, reasonOf } from "../../../nerf/viewer/page/verdict.js";
 export function createCards(model, poseShown, look) {
   /** @type {ReturnType<typeof createCard>[]} */
   let cards = [];
+  let selected = model.selected;
 
   function show() {
     const figures = model.figures;
@@ -25,6 +26,10 @@ export function createCards(model, poseShown, look) {
       part("cards", HTMLElement).replaceChildren(...cards.map((card) => card.item));
     }
     figures.forEach((figure, i) => cards[i].show(figure));
+    if (model.selected === selected) return;
+    selected = model.selected;
+    const isBeside = model.mode === "cameras" && matchMedia("(min-width: 60rem)").matches;
+    if (isBeside) cards[selected]?.item.scrollIntoView({ block: "nearest" });
   }
 
   model.listen(show);
@@ -106,7 +111,7 @@ function createCard(model, index, poseShown, look) {
       reason.textContent = excluded
         ? "It is left out."
         : view
-          ? `${reasonOf(view)}${said?.landmarks?.length ? ` Landmarks: ${said.landmarks.length}.` : ""}`
+          ? `${view.caption ? `Its caption says ${view.caption}. ` : ""}${reasonOf(view)}${said?.landmarks?.length ? ` Landmarks: ${said.landmarks.length}.` : ""}`
           : "Not fitted yet.";
       for (const button of [flip, lock]) button.disabled = excluded || !view;
       lock.setAttribute("aria-pressed", String(!!said?.lock));

@@ -43,11 +43,39 @@ export function figuresOf(scene, said) {
   const found = scene.views.map((view) => view.box);
   const excluded = (said.views ?? []).filter((view) => view.exclude).map((view) => view.box);
   const apart = excluded.filter((box) => !matching(scene.views, box));
-  return (said.boxes ?? [...found, ...apart]).map((box) => ({
+  const { group = 1, outfit = "" } = said;
+  const asFitted = group === scene.group && outfit === scene.outfit;
+  const cut = asFitted ? [...found, ...apart] : boxesOf(scene, group, outfit);
+  return (said.boxes ?? cut).map((box) => ({
     box,
     view: matching(scene.views, box),
     said: matching(said.views, box),
   }));
+}
+
+/** @param {Scene} scene @param {number} group from 1 @param {string} outfit letter of a row, "" for all @returns {Box[]} */
+function boxesOf(scene, group, outfit) {
+  const rows = scene.groups[group - 1]?.rows ?? [];
+  return (outfit ? [rows[outfit.charCodeAt(0) - 65] ?? []] : rows).flat();
+}
+
+/**
+ * @param {Scene} scene
+ * @param {Corrections} said
+ * @param {number} group from 1, the likeliest
+ * @param {string} outfit letter of a row, "" for all
+ * @returns {Corrections} that takes those figures, and keeps what was said of them
+ */
+export function withGroup(scene, said, group, outfit) {
+  const boxes = boxesOf(scene, group, outfit);
+  const views = said.views?.filter((view) => boxes.some((box) => overlapOf(view.box, box) > 0));
+  return without({
+    ...said,
+    boxes: undefined,
+    group: group > 1 ? group : undefined,
+    outfit: outfit || undefined,
+    views: views?.length ? views : undefined,
+  });
 }
 
 /**
@@ -72,7 +100,7 @@ export function withView(said, box, change) {
  */
 export function withBoxes(said, boxes, moved = new Map()) {
   /** @type {Corrections} */
-  let next = { ...said, boxes: boxes.map(rounded) };
+  let next = without({ ...said, boxes: boxes.map(rounded), group: undefined, outfit: undefined });
   for (const [old, box] of moved) {
     if (matching(said.views, old)) next = withView(next, old, { box: rounded(box) });
   }

@@ -1,6 +1,7 @@
 // Boxes of the figures: drawn, moved, resized, merged, cut, left out and brought back; the paper.
 
 import { matching, withBoxes, withView } from "./corrections.js";
+import { thumbnail } from "./groups.js";
 import { element, part, say } from "../../../nerf/viewer/page/elements.js";
 import { clamp } from "../../../nerf/viewer/page/state.js";
 
@@ -10,6 +11,7 @@ import { clamp } from "../../../nerf/viewer/page/state.js";
 /** @typedef {import("./types.js").Tool} Tool */
 
 const GRIP = 12; // pixels of the screen round a corner or an edge
+const LOWEST = 17; // pixels of the screen: the letter of a lower patch would cover its neighbours
 const LEAST = 8; // pixels of the sheet: smaller is no figure
 const SHADES = { figure: "#12639c", off: "#b02318", left: "#575b61" };
 
@@ -26,10 +28,11 @@ const KINDS = {
 
 /**
  * @param {import("./model.js").Model} model
+ * @param {HTMLImageElement} picture the sheet
  * @param {(at: Point) => string} colorAt of the sheet, "#rrggbb"
  * @returns {Tool}
  */
-export function createFiguresTool(model, colorAt) {
+export function createFiguresTool(model, picture, colorAt) {
   /** @type {"" | "paper" | "cut"} what the next click is for */
   let armed = "";
   /** @type {Box | null} that is being drawn or moved */
@@ -97,8 +100,16 @@ export function createFiguresTool(model, colorAt) {
     if (armed) say(armed === "paper" ? "Click the paper." : "Click where the box is to be cut, with Shift the other way; Enter cuts its middle.");
   }
 
+  /** @returns {{box: Box, kind: string}[]} drawings first */
   function leftOut() {
-    return model.scene.leftOut.filter((one) => !matching(model.figures, one.box));
+    const left = model.scene.leftOut.filter((one) => !matching(model.figures, one.box));
+    return [...left.filter(isDrawing), ...left.filter((one) => !isDrawing(one))];
+  }
+
+  /** @param {Point} at @returns {Box | undefined} of a drawing that was left out */
+  function drawingAt(at) {
+    const drawings = leftOut().filter(isDrawing).map((one) => one.box);
+    return drawings[topmost(drawings, at)];
   }
 
   /** @param {string} id @param {() => void} act */
@@ -114,14 +125,15 @@ export function createFiguresTool(model, colorAt) {
   });
 
   on("find_boxes", () => {
-    const { boxes, ...rest } = model.said;
+    const { boxes, group, outfit, ...rest } = model.said;
     model.change(rest);
   });
 
   function showLeftOut() {
     const items = leftOut().map(({ box, kind }, i) => {
       const word = `Take “${letterOf(i)}”, ${KINDS[kind] ?? kind}, as a figure`;
-      const button = element("button", { type: "button" }, word);
+      const shown = thumbnail(picture, [[box]]);
+      const button = element("button", { type: "button", "aria-label": word, title: word }, shown, letterOf(i));
       button.addEventListener("click", () => add(box));
       return element("li", {}, button);
     });
@@ -131,7 +143,7 @@ export function createFiguresTool(model, colorAt) {
     part("paper", HTMLElement).style.backgroundColor = paper ?? "transparent";
     part("paper_word", HTMLElement).textContent = paper ?? "transparent";
     part("find_paper", HTMLButtonElement).disabled = !model.said.background;
-    part("find_boxes", HTMLButtonElement).disabled = !model.said.boxes;
+    part("find_boxes", HTMLButtonElement).disabled = !(model.said.boxes || model.said.group || model.said.outfit);
     const excluded = !!model.figure?.said?.exclude;
     part("drop_box", HTMLElement).textContent = excluded ? "Bring back" : "Drop";
     for (const id of ["merge_boxes", "cut_box", "drop_box"]) {
@@ -147,14 +159,15 @@ export function createFiguresTool(model, colorAt) {
       context.textBaseline = "top";
       leftOut().forEach(({ box }, i) => {
         outline(context, box, px, SHADES.left, [4, 3]);
-        tag(context, box, px, SHADES.left, letterOf(i)); // its kind would cover the next one's
+        if (box[3] > LOWEST * px) tag(context, box, px, SHADES.left, letterOf(i));
       });
-      model.figures.forEach(({ box, said }, i) => {
+      model.figures.forEach((figure, i) => {
+        const { box, said } = figure;
         const chosen = i === model.selected || model.also.includes(i);
         const shown = draft && i === model.selected ? draft : box;
         const shade = said?.exclude ? SHADES.off : SHADES.figure;
         outline(context, shown, chosen ? 2 * px : px, shade, said?.exclude ? [6, 4] : []);
-        tag(context, shown, px, shade, said?.exclude ? `${i + 1} left out` : String(i + 1));
+        tag(context, shown, px, shade, nameOf(figure, i));
         if (i === model.selected) corners(context, shown, px, shade);
       });
       if (draft && !model.figure) outline(context, draft, px, SHADES.figure, []);
@@ -193,7 +206,8 @@ export function createFiguresTool(model, colorAt) {
       if (armed) return "crosshair";
       const own = model.figure?.box;
       if (own && gripAt(own, at, GRIP * px)) return "nwse-resize";
-      return topmost(boxes(), at) < 0 ? "crosshair" : "move";
+      if (topmost(boxes(), at) >= 0) return "move";
+      return drawingAt(at) ? "pointer" : "crosshair";
     },
   };
 
@@ -222,10 +236,24 @@ export function createFiguresTool(model, colorAt) {
       end: () => {
         const box = draft;
         draft = null;
-        if (box && Math.min(box[2], box[3]) >= LEAST) add(box);
+        const left = drawingAt(from);
+        if (!box && left) add(left);
+        else if (box && Math.min(box[2], box[3]) >= LEAST) add(box);
       },
     };
   }
+}
+
+/** @param {{kind: string}} leftOut @returns {boolean} whether it may be a figure */
+function isDrawing({ kind }) {
+  return kind === "study" || kind === "dropped";
+}
+
+/** @param {import("./types.js").Figure} figure @param {number} index @returns {string} its number, and what it is called */
+export function nameOf({ view, said }, index) {
+  const label = said?.label || view?.caption || "";
+  const word = said?.exclude ? "left out" : label && Number.isFinite(Number(label)) ? `${label}°` : label;
+  return word ? `${index + 1} ${word}` : String(index + 1);
 }
 
 /** @param {Box[]} boxes @param {Point} at @returns {number} the smallest one there, -1 = none */

@@ -2,7 +2,8 @@
 
 import { createCamerasTool } from "./cameras_tool.js";
 import { createCards } from "./cards.js";
-import { createFiguresTool } from "./figures_tool.js";
+import { createFiguresTool, nameOf } from "./figures_tool.js";
+import { createGroups } from "./groups.js";
 import { createKeeper } from "./keeper.js";
 import { createModel } from "./model.js";
 import { createPalettePanel } from "./palette_panel.js";
@@ -62,8 +63,9 @@ async function start({ scene, corrections, busy, error }, keeper) {
   const panel = createPalettePanel(shown);
   const palette = createPaletteTool(shown, colorAt, panel.paint, () => sheet.draw());
   panel.splitWith(palette.pick);
-  const tools = { figures: createFiguresTool(shown, colorAt), cameras: cameras.tool, palette: palette.tool };
+  const tools = { figures: createFiguresTool(shown, picture, colorAt), cameras: cameras.tool, palette: palette.tool };
   const sheet = createSheet(shown, picture, () => tools[shown.mode]);
+  createGroups(shown, picture);
   createCards(shown, cameras.shownPose, sheet.look);
   createPosePanel(shown, cameras);
   createStatus(shown, keeper.fits);
@@ -79,7 +81,7 @@ async function start({ scene, corrections, busy, error }, keeper) {
   };
   shown.listen(showMode);
   showMode();
-  Object.assign(globalThis, { toonset: { model: shown, sheet, cameras } });
+  Object.assign(globalThis, { toonset: { model: shown, sheet, cameras, nameOf } });
 }
 
 /** @param {HTMLImageElement} picture @param {number[]} size @returns {(at: number[]) => string} */

@@ -29,7 +29,7 @@ export function createModel(scene, corrections) {
     error: "",
     trouble: "", // why nothing is kept, or no more
     /** @type {Mode} */
-    mode: "cameras",
+    mode: startsWithFigures(scene, corrections) ? "figures" : "cameras",
     selected: 0,
     /** @type {number[]} figures that are selected besides */
     also: [],
@@ -99,4 +99,10 @@ export function createModel(scene, corrections) {
   }
 
   return model;
+}
+
+/** @param {Scene} scene @param {Corrections} said @returns {boolean} whether there is a choice that nobody has made yet */
+function startsWithFigures({ groups, leftOut }, said) {
+  const choice = groups.flatMap(({ rows }) => rows).length > 1 || leftOut.some(({ kind }) => kind === "study");
+  return choice && !(said.boxes || said.group || said.outfit || said.views);
 }

@@ -3,7 +3,7 @@
 import { withView } from "./corrections.js";
 import { part } from "../../../nerf/viewer/page/elements.js";
 
-const NO_BODY = "Click a drawing to choose it; its compass below says from which side it is seen.";
+const NO_BODY = "Click a drawing to choose it; its compass says from which side it is seen.";
 const FIELDS = ["yaw", "elevation", "roll", "scale"];
 
 /**

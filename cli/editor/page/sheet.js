@@ -25,7 +25,6 @@ export function createSheet(model, picture, tool) {
   if (!context) throw new Error("this browser draws no pictures");
   const [width, height] = model.scene.sheet.size;
   let view = { zoom: 1, x: 0, y: 0 }; // pixels of the screen per pixel of the sheet, and its corner
-  part("stage", HTMLElement).style.aspectRatio = `${width} / ${height}`;
   let frame = 0;
   /** @type {Map<number, Point>} */
   const pointers = new Map();

@@ -9,6 +9,7 @@
  * @property {string} name file name
  * @property {Box} box of what the figure covers
  * @property {Box} crop of its picture
+ * @property {string} caption what the sheet itself calls it; empty where it does not
  * @property {"ok" | "weak" | "ambiguous" | "failed" | ""} verdict
  * @property {string} reason in words
  * @property {{yaw: number, elevation: number}} sigma degrees
@@ -26,6 +27,9 @@
  * @typedef {object} Scene the bundle
  * @property {string} title
  * @property {{name: string, sha256: string, size: number[], background: string | null, notes: string[], picture?: string}} sheet
+ * @property {{rows: Box[][], why: string, outfits: boolean}[]} groups of equal figures, the likeliest turnaround first
+ * @property {number} group that is fitted, from 1
+ * @property {string} outfit letter of its row that is fitted, "" for all
  * @property {{box: Box, kind: string}[]} leftOut what the splitter saw besides
  * @property {{state: string, reason: string}} verdict of the sheet
  * @property {ViewRecord[]} views
@@ -70,6 +74,8 @@
  * @property {{name: string, sha256: string, size: number[]}} [sheet]
  * @property {string} [background]
  * @property {Box[]} [boxes]
+ * @property {number} [group] from 1, without boxes
+ * @property {string} [outfit] letter of its row
  * @property {ViewSaid[]} [views]
  * @property {PaletteSaid} [palette]
  */

@@ -50,10 +50,13 @@ def open_page(open_at: Open, tmp_path: Path) -> Open:
         *,
         body: bool = True,
         title: str = "A bundle",
+        outfits: bool = False,
         **options: Any,
     ) -> Editor:
         path = tmp_path / "edit.html"
-        page = page_of(figure_scene(body, title), corrections or {"version": 1}, title)
+        page = page_of(
+            figure_scene(body, title, outfits=outfits), corrections or {"version": 1}, title
+        )
         path.write_text(page, encoding="utf-8")
         return open_at(path.as_uri(), path.as_uri(), **options)
 

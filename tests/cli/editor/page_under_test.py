@@ -17,6 +17,7 @@ from toonset.view import View
 
 SIZE_WH = (400, 200)
 BOXES = ([20, 40, 60, 120], [140, 40, 60, 120], [260, 40, 60, 120])
+STUDY = [350, 10, 40, 40]
 YAWS = (0.0, 40.0, 180.0)
 COLORS = np.array([[200, 40, 40], [40, 80, 200], [240, 220, 60]], np.uint8)
 HEXES = ("#c82828", "#2850c8", "#f0dc3c")
@@ -42,10 +43,18 @@ def slab() -> Mesh:
     return Mesh(corners.astype(float), np.array(faces, dtype=np.int64), name="slab")
 
 
-def figure_scene(body: bool = True, title: str = "A bundle") -> dict[str, Any]:
+def figure_scene(
+    body: bool = True, title: str = "A bundle", *, outfits: bool = False
+) -> dict[str, Any]:
     """Return the numbers of a page."""
     labels = np.full((128, 68), 255, np.uint8)
     labels[4:64, 4:64], labels[64:124, 4:64] = 0, 1
+    groups = [{"rows": [list(BOXES)], "why": "3 figures, 120 px high", "outfits": False}]
+    study = [{"box": STUDY, "kind": "study"}] if outfits else []
+    if outfits:
+        rows = [list(BOXES[:2]), [BOXES[2]]]
+        groups = [{"rows": rows, "why": "3 figures in 2 rows", "outfits": True}]
+        groups += [{"rows": [[STUDY]], "why": "1 figure", "outfits": False}]
     views = []
     for i, (box, yaw) in enumerate(zip(BOXES, YAWS, strict=True)):
         rgba = np.zeros((128, 68, 4), np.uint8)
@@ -58,6 +67,7 @@ def figure_scene(body: bool = True, title: str = "A bundle") -> dict[str, Any]:
                 "name": view.name,
                 "box": box,
                 "crop": list(view.box),
+                "caption": "front" if i == 0 else "",
                 "verdict": VERDICTS[i],
                 "reason": "" if i == 0 else f"why it is {VERDICTS[i]}",
                 "sigma": {"yaw": 5.0 + 20 * i, "elevation": 2.0},
@@ -80,7 +90,10 @@ def figure_scene(body: bool = True, title: str = "A bundle") -> dict[str, Any]:
             "notes": [],
             "picture": data_url(sheet_png(), "image/png"),
         },
-        "leftOut": [{"box": [300, 170, 90, 20], "kind": "text"}],
+        "groups": groups,
+        "group": 1,
+        "outfit": "",
+        "leftOut": [{"box": [300, 170, 90, 20], "kind": "text"}, *study],
         "verdict": {"state": "ambiguous", "reason": "drawing 3 may be a front"},
         "views": views,
         "mannequin": _mannequin(slab()) if body else None,

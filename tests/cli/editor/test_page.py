@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.editor.conftest import Open
-from tests.cli.editor.page_under_test import BOXES, HEXES, HOSTILE, Editor
+from tests.cli.editor.page_under_test import BOXES, HEXES, HOSTILE, STUDY, Editor
 from toonset.dataset.split_folder.corrections import parse_corrections
 
 
@@ -60,12 +60,70 @@ def test_boxes_are_merged_and_cut(editor: Editor) -> None:
 
 def test_what_was_left_out_is_named_and_comes_back(editor: Editor) -> None:
     editor.mode("Figures")
-    editor.click("Take “a”, text, as a figure")
+    editor.page.get_by_label("Take “a”, text, as a figure").click()
     assert editor.said["boxes"][3] == [300, 170, 90, 20]
     assert editor.page.locator("#left_out_row").is_hidden()
     editor.click("All as found")
     assert "boxes" not in editor.said
     assert editor.page.locator("#left_out_row").is_visible()
+
+
+def test_a_group_and_a_row_are_taken_in_one_click(open_page: Open) -> None:
+    kept = {"box": BOXES[2], "label": "back"}
+    editor = open_page(
+        {"version": 1, "views": [{"box": BOXES[0], "label": "front"}, kept]}, outfits=True
+    )
+    editor.mode("Figures")
+    groups = editor.page.locator("#groups button")
+    pressed = "[...document.querySelectorAll('#groups button')].map((one) => one.ariaPressed)"
+    assert editor.page.evaluate(pressed) == ["true", "false", "false", "false"]
+    groups.nth(2).focus()
+    editor.page.keyboard.press("Enter")
+    assert editor.said["outfit"] == "B"
+    assert editor.views == [kept]  # what was said of the others goes
+    assert editor.page.evaluate("toonset.model.figures.map((one) => one.box)") == [BOXES[2]]
+    assert editor.page.evaluate(pressed) == ["false", "false", "true", "false"]
+    assert editor.page.evaluate("document.activeElement.textContent") == "Outfit B"
+    assert is_valid(editor)
+    groups.nth(3).click()
+    assert (editor.said["group"], "outfit" in editor.said) == (2, False)
+    editor.drag((30, 20), (80, 150))  # who draws boxes says which figures count
+    assert len(editor.said["boxes"]) == 2
+    assert "group" not in editor.said
+    assert is_valid(editor)
+    for _ in range(3):
+        editor.click("Undo")
+    assert len(editor.views) == 2
+
+
+def test_the_page_starts_with_the_groups_until_something_is_said(open_page: Open) -> None:
+    assert open_page(outfits=True).page.locator("#groups").is_visible()
+    assert open_page().page.locator("#groups").is_hidden()
+
+
+def test_a_drawing_that_was_left_out_is_a_click_away(open_page: Open) -> None:
+    editor = open_page(outfits=True)
+    editor.tap(370, 30)
+    assert editor.said["boxes"][3] == STUDY
+    editor.click("All as found")
+    assert "boxes" not in editor.said
+
+
+@pytest.mark.parametrize(("width", "height"), [(1600, 1000), (1024, 700), (390, 800)])
+def test_the_stage_is_as_large_as_the_window(open_page, width, height):
+    page = open_page(viewport={"width": width, "height": height}).page
+    box = page.locator("#stage").bounding_box()
+    beside = 0 if width < 960 else max(320, 0.26 * width)
+    assert box["width"] > width - beside - 60
+    assert box["height"] > 0.7 * height
+
+
+def test_captions_are_shown_until_a_person_says_otherwise(editor: Editor) -> None:
+    card = editor.page.locator(".card").first
+    assert "Its caption says front." in card.inner_text()
+    assert editor.page.evaluate("toonset.nameOf(toonset.model.figures[0], 0)") == "1 front"
+    editor.page.get_by_role("radio", name="its left side").first.check()
+    assert editor.page.evaluate("toonset.nameOf(toonset.model.figures[0], 0)") == "1 left"
 
 
 def test_the_paper_is_picked(editor: Editor) -> None:

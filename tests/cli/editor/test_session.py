@@ -7,12 +7,15 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
+from dataclasses import replace
 from http.client import HTTPConnection
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from bench.messy.sheet import make_messy_sheet
 from toonset.calib.without_body.judge import ASK
 from toonset.cli.editor import opening, refit
 from toonset.cli.editor import session as session_module
@@ -22,6 +25,7 @@ from toonset.cli.editor.scene import PALETTE, for_page, scene_of
 from toonset.cli.editor.session import Session, StaleError
 from toonset.dataset.bundle.bundle import read_bundle
 from toonset.dataset.bundle.check import bundle_problems
+from toonset.dataset.images.picture import encode_png
 from toonset.dataset.split_folder.load import split_sheet
 from toonset.errors import BundleError, SheetError, ToonsetError
 
@@ -226,6 +230,32 @@ def test_parts_that_change() -> None:
         True, True, True
     )
     assert parts_changed(said, said | {"palette": {"drop": []}}) == Changed(False, False, True)
+    assert parts_changed(said, said | {"outfit": "B"}) == Changed(True, True, True)
+
+
+def test_an_outfit_is_cut_and_what_its_captions_say_outlives_labels(tmp_path: Path) -> None:
+    sheet = tmp_path / "outfits.png"
+    sheet.write_bytes(encode_png(make_messy_sheet(4102, ("outfits",)).rgba))
+    whole = split_sheet(sheet)
+    row = whole.split.sources[0].groups[0].rows[1]
+    said = {"version": 1, "outfit": "B", "views": [{"box": list(row[0]), "label": "front"}]}
+    found, file = refit.cut_sheet(sheet, said, tmp_path)
+    assert len(found.views) == len(row) < len(whole.views)
+    assert {view.label for view in found.views} == {""}
+    assert file is not None
+    assert json.loads(file.read_bytes()) == said
+    captioned = replace(found.split, views=tuple(replace(v, label="side") for v in found.views))
+    views = refit._labelled(replace(found, split=captioned), file)
+    assert [view.label for view in views] == ["front", *["side"] * (len(row) - 1)]
+
+
+def test_a_bundle_of_another_outfit_is_opened_as_it_was_cut(tmp_path: Path) -> None:
+    sheet = tmp_path / "outfits.png"
+    sheet.write_bytes(encode_png(make_messy_sheet(4102, ("outfits",)).rgba))
+    options = {"outfit": "B"}
+    found = SimpleNamespace(options=options, views=split_sheet(sheet, outfit="B").views)
+    _, corrections = opening._as_it_was_cut(Subject(sheet, None, tmp_path), found)
+    assert corrections == {"version": 1, "outfit": "B"}
 
 
 def test_reasons_on_the_page_name_no_options() -> None:

@@ -47,9 +47,9 @@ def test_another_group_is_announced_only_where_it_is_nearly_as_likely() -> None:
 
 def test_a_group_that_is_not_there_is_refused() -> None:
     messy = make_messy_sheet(4100, ("plain",))
-    with pytest.raises(SheetError, match="--group: the sheet has 1 group"):
+    with pytest.raises(SheetError, match="no such group: the sheet has 1"):
         split_picture(messy.rgba, SheetOptions(taken=Taken(group=1)))
-    with pytest.raises(SheetError, match="--outfit: the group has one row"):
+    with pytest.raises(SheetError, match="no such outfit: the group has one row"):
         split_picture(messy.rgba, SheetOptions(taken=Taken(outfit=1)))
 
 

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from PIL import Image, ImageDraw
 from pydantic import TypeAdapter
 
+from bench.messy.sheet import make_messy_sheet
 from toonset.dataset.split_folder.corrected import Given, match_boxes, overlap
 from toonset.dataset.split_folder.corrections import (
     Corrections,
@@ -82,6 +83,10 @@ def test_what_is_written_is_read_again():
         ({"boxes": [[1, 2, 3]]}, "boxes.0: four numbers x, y, width, height are needed"),
         ({"boxes": [[1, 2, 0, 3]]}, "boxes.0: 0 x 3 px is empty"),
         ({"boxes": [[1, 2, True, 3]]}, "boxes.0: four numbers"),
+        ({"group": 0}, "group: Input should be greater than or equal to 1"),
+        ({"outfit": "AB"}, "outfit: String should match"),
+        ({"boxes": [[1, 2, 3, 4]], "group": 2}, "boxes and group both say which figures count"),
+        ({"boxes": [[1, 2, 3, 4]], "outfit": "B"}, "boxes and outfit both say"),
         ({"views": {}}, "views: Input should be a valid array"),
         ({"views": [{}]}, "views.0.box: is missing"),
         ({"views": [VIEW, VIEW]}, "views.1.box: is that of views.0; merge them"),
@@ -213,6 +218,9 @@ def test_boxes_by_hand_may_be_generous(sheet: Path, tmp_path):
         ({"boxes": [[0, 0, 100, 190]] * 2}, {}, "boxes: box 1 is the same as box 0"),
         ({"views": [{"box": [-5, 0, 9, 9]}]}, {}, "views: box 0 (x -5, y 0, 9 x 9 px) leaves the"),
         ({"boxes": [[0, 0, 100, 190]]}, {"grid": "3x1"}, "boxes and --grid say the same thing"),
+        ({"boxes": [[0, 0, 100, 190]]}, {"group": 2}, "boxes and --group say the same thing"),
+        ({"group": 1}, {"group": 2}, "group and --group say the same thing"),
+        ({"outfit": "A"}, {"boxes": "boxes.csv"}, "outfit and --boxes say the same thing"),
         ({"background": "#ffffff"}, {"background": "white"}, "background and --background say"),
         ({"views": [{**VIEW, "exclude": True}]}, {"drop": "0"}, "views.exclude and --drop say"),
         ({"views": [{**VIEW, "label": "front"}]}, {"labels": "?,?,?"}, "views.label and --views"),
@@ -223,6 +231,23 @@ def test_what_the_sheet_or_an_option_speaks_against(content, options, words, she
         split_sheet(sheet, corrections=written(tmp_path, **content), **options)
     assert "corrections.json: " in str(refused.value)
     assert words in str(refused.value)
+
+
+def test_a_group_and_an_outfit_are_taken_as_the_options_take_them(tmp_path: Path) -> None:
+    sheet = tmp_path / "poses.png"
+    Image.fromarray(make_messy_sheet(4100, ("poses",)).rgba).save(sheet)
+    poses = split_sheet(sheet, group=2).views
+    found = split_sheet(sheet, corrections=written(tmp_path, group=2)).views
+    assert [view.box for view in found] == [view.box for view in poses]
+    with pytest.raises(SheetError, match="there is no such group: the sheet has 2"):
+        split_sheet(sheet, corrections=written(tmp_path, group=3))
+
+
+def test_boxes_of_an_option_stay_beside_a_background_by_hand(sheet: Path, tmp_path):
+    boxes = tmp_path / "boxes.csv"
+    boxes.write_text("0,0,115,200\n")
+    path = written(tmp_path, background="#ffffff")
+    assert len(split_sheet(sheet, boxes=boxes, corrections=path).views) == 1
 
 
 def test_not_all_views_may_be_excluded(sheet: Path, tmp_path):
