@@ -85,8 +85,8 @@ def find_groups(blobs: Blobs) -> tuple[Group, ...]:
         else:
             joined.append([row])
     groups = [_group(blobs, rows, alone=len(joined) == 1) for rows in joined]
-    best, *others = sorted(groups, key=lambda group: -group.merit)
-    return (best, *sorted(others, key=lambda group: len(group.members) == 1))
+    likeliest, *rest = sorted(groups, key=lambda group: -group.merit)
+    return (likeliest, *sorted(rest, key=lambda group: len(group.members) == 1))
 
 
 def _candidates(blobs: Blobs) -> Int[np.ndarray, " candidates"]:
