@@ -19,6 +19,7 @@ from toonset.raster import dilate, erode
 
 LEAST_SHARE = 0.004  # of the sheet that has the tone
 FAINT = (8, 72)  # levels from the paper: the mark's contrast on it
+ABOVE_NOISE = 2  # times the paper's tolerance: what differs by less is grain
 MOST_SAMPLES = 2**20  # of which the tone is the commonest
 SAME = 5  # levels: one tone, or one flat colour
 LEAST_SCRAPS = 8
@@ -43,10 +44,17 @@ class Watermark:
 
 
 def find_watermark(
-    rgb: UInt8[np.ndarray, "height width 3"], paper: tuple[int, int, int] | None
+    rgb: UInt8[np.ndarray, "height width 3"], paper: tuple[int, int, int] | None, tolerance: int
 ) -> Watermark | None:
-    """Return the mark that lies all over a sheet of plain paper; None if there is none."""
-    tone = None if paper is None else _faint_tone(rgb, paper)
+    """Return the mark that lies all over a sheet of plain paper; None if there is none.
+
+    Args:
+        rgb: the sheet.
+        paper: the background's colour; None where it has none.
+        tolerance: the background's noise in levels.
+    """
+    faintest = max(FAINT[0], ABOVE_NOISE * tolerance)
+    tone = None if paper is None else _faint_tone(rgb, paper, faintest)
     if paper is None or tone is None:
         return None
     mask = difference(rgb, np.broadcast_to(tone, rgb.shape)) <= SAME
@@ -72,13 +80,13 @@ def find_watermark(
 
 
 def _faint_tone(
-    rgb: UInt8[np.ndarray, "height width 3"], paper: tuple[int, int, int]
+    rgb: UInt8[np.ndarray, "height width 3"], paper: tuple[int, int, int], faintest: int
 ) -> UInt8[np.ndarray, " 3"] | None:
     """Return the commonest colour that is a little off the paper's."""
     step = max(1, round((rgb.size / MOST_SAMPLES) ** 0.5))
     rgb = np.ascontiguousarray(rgb[::step, ::step])
     away = difference(rgb, np.broadcast_to(np.array(paper, np.uint8), rgb.shape))
-    faint = rgb[(away >= FAINT[0]) & (away <= FAINT[1])]
+    faint = rgb[(away >= faintest) & (away <= FAINT[1])]
     if not len(faint):
         return None
     bins = (faint >> 2).astype(np.int32) @ np.array([4096, 64, 1], np.int32)
