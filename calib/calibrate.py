@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from toonset.calib.captions import weigh_captions
 from toonset.calib.find_cameras import find_cameras
 from toonset.calib.flaws.cropped import at_cuts
 from toonset.calib.flaws.false_holes import fill_false_holes
@@ -30,6 +31,7 @@ from toonset.dataset.mannequin.files import landmarks_path
 from toonset.dataset.mannequin.landmark_file import read_known_points
 from toonset.dataset.mannequin.make import Mannequin, default_mannequin
 from toonset.dataset.mannequin.options import MannequinOptions
+from toonset.dataset.split_folder.view_labels import parse_labels
 from toonset.errors import MeshError, UsageError
 from toonset.mesh import Mesh
 from toonset.view import InputFile, View
@@ -76,6 +78,30 @@ def calibrate(
     _check_view_names([view.name for view in views])
     if cues is None or not cues.are_of(views):
         cues = Cues(views)
+
+    def as_said(hints: Hints) -> Calibration:
+        return _calibrate(views, mesh, hints, seed, progress, cues, options)
+
+    found, captions = as_said(hints), hints.captions_of(views)
+    if not captions:
+        return found
+    labels = parse_labels(captions, len(views))
+    labelled = replace(hints, labels=captions)
+    weighed = weigh_captions(found, labels, lambda: as_said(labelled), options.thresholds)
+    said = {**weighed.origin["options"], "views": None, "captions": captions}
+    return replace(weighed, origin={**weighed.origin, "options": said})
+
+
+def _calibrate(
+    views: Sequence[View],
+    mesh: Mesh | Literal["none"] | None,
+    hints: Hints,
+    seed: int,
+    progress: Progress,
+    cues: Cues,
+    options: CalibrationOptions,
+) -> Calibration:
+    """Return one camera per drawing by the drawings and the hints alone."""
     if isinstance(mesh, str):
         known = _known_without_body(hints, views)
         with threadpool_limits(1, user_api="blas"):

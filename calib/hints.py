@@ -89,6 +89,13 @@ class Hints:
             return self.labels
         return ",".join(view.label or "?" for view in views)
 
+    def captions_of(self, views: Sequence[View]) -> str:
+        """Return what the sheet says of the views, "" where a person has said anything."""
+        said = self.label_text(views) or self.landmarks or self.init or self.lock
+        if said or self.corrections or not any(view.caption for view in views):
+            return ""
+        return ",".join(view.caption or "?" for view in views)
+
     def as_options(self, views: Sequence[View]) -> dict[str, Any]:
         """Return what calibration.json keeps besides the files."""
         return {

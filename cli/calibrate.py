@@ -264,6 +264,8 @@ def _say_result(found: Calibration, out: Path, printer: Printer) -> None:
             printer.say(f"{fit.view}: landmarks that do not fit the others: {names}; check them")
     for change in (*found.cuts, *found.filled_holes):
         printer.say(str(change))
+    if captions := found.origin["options"].get("captions"):
+        printer.say(f"captions were read: {captions}; --views says otherwise")
     printer.say(model_line(found))
     printer.detail(evidence_line(found))
     for view in found.views:

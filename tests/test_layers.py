@@ -45,7 +45,7 @@ FLOORS: dict[str, tuple[str, ...]] = {
         "@result search",
         "@known flaws verdict",
         "@from_landmarks @pipeline without_body",
-        "@find_cameras @hints @write_bundle",
+        "@captions @find_cameras @hints @write_bundle",
         "@calibrate",
     ),
     "nerf": (

@@ -37,6 +37,7 @@ class View:
         paper: sRGB of the sheet behind the drawing; None where it is transparent or unknown, or
             where a person has had the chance to correct what was cut out.
         label: what it shows, as a person has said ("front", "3q", "90"); empty where nobody has.
+        caption: what it shows as the sheet says ("front", "3q"); empty where nothing was read.
         origin: what it was cut from; None where that is not recorded.
         sheet: the one file that it was cut from; None where that is not recorded.
         swatches: 8-bit sRGB colours of the palette that its sheet prints, in reading order; empty
@@ -50,6 +51,7 @@ class View:
     ends: Ends = NO_ENDS
     paper: tuple[int, int, int] | None = None
     label: str = ""
+    caption: str = ""
     origin: Origin | None = None
     sheet: InputFile | None = None
     swatches: tuple[tuple[int, int, int], ...] = ()
@@ -67,6 +69,11 @@ class View:
     def figure_box(self) -> tuple[int, int, int, int]:
         """Return (x, y, width, height) in the sheet of what the figure visibly covers."""
         return visible_box(self.rgba, self.box)
+
+    @property
+    def shows(self) -> str:
+        """Return its label, else its caption; "" where it has neither."""
+        return self.label or self.caption
 
     @property
     def mask(self) -> Bool[np.ndarray, "height width"]:

@@ -16,6 +16,7 @@ from jaxtyping import UInt8
 
 from toonset.dataset.images.folder import picture_files
 from toonset.dataset.images.picture import decode_rgba
+from toonset.dataset.split.captions import with_captions
 from toonset.dataset.split.sheet import SheetOptions, split_picture
 from toonset.dataset.split_folder.boxes import check_boxes, read_boxes
 from toonset.dataset.split_folder.checks import odd_files
@@ -169,7 +170,7 @@ def _labelled(sheet: Sheet, text: str) -> Sheet:
     parse_labels(text, kept)
     words = ["" if word.strip() == "?" else word.strip() for word in text.split(",")]
     pairs = zip(sheet.views, words, strict=True)
-    views = tuple(replace(view, label=word) for view, word in pairs)
+    views = tuple(replace(view, label=word, caption="") for view, word in pairs)
     return replace(sheet, split=replace(sheet.split, views=views))
 
 
@@ -248,7 +249,7 @@ def _of_sheet(path: Path, options: SheetOptions, where: str) -> Sheet:
     height, width = picture.shape[:2]
     check_boxes(options.boxes, (width, height), where)
     try:
-        found = split_picture(picture, options)
+        found = with_captions(picture, split_picture(picture, options))
     except SheetError as error:
         raise SheetError(f"{path}: {error}") from error
     split = split_of_sheet(as_text(path.name), data, (width, height), found)

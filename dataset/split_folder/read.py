@@ -73,7 +73,8 @@ def read_split(folder: Path) -> tuple[Split, tuple[str, ...]]:
             found.append(source)
         record = picture.record
         source_of.append(len(found) - 1 if source or record is None else record.sheet)
-        views.append(replace(view, label=(record.label if record else None) or ""))
+        said = (record.label, record.caption) if record else ("", "")
+        views.append(replace(view, label=said[0] or "", caption=said[1] or ""))
         notes += [f"{folder}: {picture.shown} {note}"] if note else []
     return Split(tuple(found), numbered(views), tuple(source_of)), tuple(notes)
 

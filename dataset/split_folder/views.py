@@ -59,8 +59,8 @@ class Split:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Return per view what it shows ("front", "90"); "" where nobody has said."""
-        return tuple(view.label for view in self.views)
+        """Return per view what it shows ("front", "90"); "" where no label or caption says."""
+        return tuple(view.shows for view in self.views)
 
 
 def split_of_sheet(name: str, data: bytes, size_wh: tuple[int, int], sheet: Segmentation) -> Split:

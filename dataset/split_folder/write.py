@@ -31,6 +31,7 @@ from toonset.write import new_folder, write_bytes, write_json
 
 NAME, VERSION = "toonset-split", 1
 MAX_JSON_BYTES = 8 * 2**20
+_Label = Annotated[str, Field(max_length=40, pattern="^[^,]*$")]
 
 
 class SplitProblems(SchemaProblems, SheetError):
@@ -47,6 +48,7 @@ class ViewRecord(BaseModel):
         crop: the same of its picture, which has a margin.
         line_width_px: of the drawn contour; 0 where there is none.
         label: what it shows, where a person has said.
+        caption: what it shows as the sheet says, where that was read.
         sha256: of its picture file.
     """
 
@@ -55,7 +57,8 @@ class ViewRecord(BaseModel):
     box: InSheet
     crop: InSheet
     line_width_px: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
-    label: Annotated[str, Field(max_length=40, pattern="^[^,]*$")] | None = None
+    label: _Label | None = None
+    caption: _Label | None = None
     sha256: str = ""
 
 
@@ -80,9 +83,10 @@ def split_dict(split: Split, options: Mapping[str, Any]) -> dict[str, Any]:
                 "box": list(view.figure_box),
                 "crop": list(view.box),
                 "line_width_px": round(view.line_width_px, 3),
-                "label": label or None,
+                "label": view.label or None,
             }
-            for view, index, label in zip(split.views, split.source_of, split.labels, strict=True)
+            | ({"caption": view.caption} if view.caption else {})
+            for view, index in zip(split.views, split.source_of, strict=True)
         ],
         "options": options,
     }
