@@ -82,7 +82,7 @@ class DrawnSheet:
     """A sheet's drawings, and what was found in them: both stay until they are cut anew.
 
     Attributes:
-        sheet: the drawings, labelled as the sheet itself says.
+        sheet: the drawings as they were cut.
         cues: what they show, whatever a person calls them.
     """
 
@@ -115,21 +115,12 @@ def file_of(corrections: dict[str, Any]) -> bytes:
 def cut_sheet(
     sheet: Path, corrections: dict[str, Any], workshop: Path
 ) -> tuple[Sheet, Path | None]:
-    """Return the drawings, cut but not labelled as corrections say, and the corrections file.
-
-    There is no file without corrections.
-    """
+    """Return the corrected drawings and their corrections file; None without corrections."""
     if corrections == NOTHING:
         return split_sheet(sheet), None
     file = workshop / CORRECTIONS
-    views = [
-        {k: view[k] for k in ("box", "exclude") if k in view}
-        for view in corrections.get(CAMERAS, ())
-    ]
-    write_bytes(file, file_of(corrections | {CAMERAS: views}))
-    found = split_sheet(sheet, corrections=file)
     write_bytes(file, file_of(corrections))
-    return found, file
+    return split_sheet(sheet, corrections=file), file
 
 
 def _labelled(sheet: Sheet, file: Path) -> tuple[View, ...]:
@@ -137,7 +128,7 @@ def _labelled(sheet: Sheet, file: Path) -> tuple[View, ...]:
     files = (*(one for one in sheet.files if one.role != BY_HAND), InputFile.of(BY_HAND, file))
     origin = Origin(files, sheet.options)
     return tuple(
-        replace(view, label=said.label if said and said.label else view.label, origin=origin)
+        replace(view, label="" if said is None else said.label, origin=origin)
         for view, said in zip(sheet.views, Given.of(file).of_views(sheet.views), strict=True)
     )
 

@@ -118,7 +118,7 @@ def _view(folder: Path, view: View, said: ViewRecord) -> dict[str, Any]:
         "name": said.name,
         "box": list(view.figure_box),
         "crop": list(view.box),
-        "caption": view.label,
+        "caption": view.caption,
         "verdict": said.verdict,
         "reason": for_page(said.reason),
         "sigma": {"yaw": said.sigma.yaw_deg, "elevation": said.sigma.elevation_deg},

@@ -7,7 +7,6 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
-from dataclasses import replace
 from http.client import HTTPConnection
 from pathlib import Path
 from types import SimpleNamespace
@@ -233,7 +232,7 @@ def test_parts_that_change() -> None:
     assert parts_changed(said, said | {"outfit": "B"}) == Changed(True, True, True)
 
 
-def test_an_outfit_is_cut_and_what_its_captions_say_outlives_labels(tmp_path: Path) -> None:
+def test_an_outfit_is_cut_as_corrections_say(tmp_path: Path) -> None:
     sheet = tmp_path / "outfits.png"
     sheet.write_bytes(encode_png(make_messy_sheet(4102, ("outfits",)).rgba))
     whole = split_sheet(sheet)
@@ -241,12 +240,9 @@ def test_an_outfit_is_cut_and_what_its_captions_say_outlives_labels(tmp_path: Pa
     said = {"version": 1, "outfit": "B", "views": [{"box": list(row[0]), "label": "front"}]}
     found, file = refit.cut_sheet(sheet, said, tmp_path)
     assert len(found.views) == len(row) < len(whole.views)
-    assert {view.label for view in found.views} == {""}
+    assert [view.label for view in found.views] == ["front", *[""] * (len(row) - 1)]
     assert file is not None
     assert json.loads(file.read_bytes()) == said
-    captioned = replace(found.split, views=tuple(replace(v, label="side") for v in found.views))
-    views = refit._labelled(replace(found, split=captioned), file)
-    assert [view.label for view in views] == ["front", *["side"] * (len(row) - 1)]
 
 
 def test_a_bundle_of_another_outfit_is_opened_as_it_was_cut(tmp_path: Path) -> None:
