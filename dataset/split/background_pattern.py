@@ -97,7 +97,7 @@ def fit_pattern(
     border = places[0][::step], places[1][::step]
     contrast = np.abs(rgb[border].astype(np.int16) - np.array(dominant, np.int16)).max(axis=1)
     odd = contrast > ODD
-    if odd.mean() < LEAST_ODD:
+    if np.count_nonzero(odd) <= LEAST_ODD * odd.size:
         return None
     odd = contrast > max(ODD, np.percentile(contrast[odd], STRONG) / 2)  # JPEG's ripples are less
     close = min(CLOSE, float(np.median(contrast[odd])) / 2)

@@ -25,6 +25,7 @@ LINE = 4  # cells: ruled lines are no thicker
 APART = 10  # levels between page and ground: a frame on the same paper is no page
 RECTANGLE = 0.9  # of the smallest rectangle round it: paper seen at an angle fills less of it
 PLAIN_RIM = 0.85  # of the page's outline that its own colour takes
+PAPER = 0.35  # of the page that is not drawn on: less is a figure's outline
 CELLS = 3  # that a zone ends before its edge
 THING = 0.12  # of the page's height: a drawing is no lower
 ALONE = 0.6  # of the page's height: one such drawing is enough
@@ -142,8 +143,10 @@ def _page(own: Bool[np.ndarray, "rows columns"]) -> _Page | None:
     cv2.drawContours(rim, [hull], -1, 1, 1)
     if filled < RECTANGLE or dilate(own, CELLS)[rim > 0].mean() < PLAIN_RIM:
         return None
+    if own.sum() < PAPER * np.count_nonzero(mask):
+        return None
     tall = int(cv2.boundingRect(mask)[3])
-    heights = _heights((mask > 0) & ~own)
+    heights = _heights((mask > 0) & ~own, rim > 0)
     tallest = int(heights.max(initial=0))
     if (heights >= THING * tall).sum() < 2 and tallest < ALONE * tall:
         return None
@@ -151,12 +154,15 @@ def _page(own: Bool[np.ndarray, "rows columns"]) -> _Page | None:
     return _Page(mask > 0, own, tallest, tilt <= UPRIGHT_DEG and filled >= UPRIGHT)
 
 
-def _heights(mask: Bool[np.ndarray, "rows columns"]) -> Int[np.ndarray, " things"]:
-    """Return the heights of connected patches, but those at the border."""
-    _, _, stats, _ = cv2.connectedComponentsWithStats(mask.view(np.uint8), connectivity=8)
-    x, y, width, height = stats[1:, :4].T
-    inside = (x > 0) & (y > 0) & (x + width < mask.shape[1]) & (y + height < mask.shape[0])
-    return np.asarray(height[inside], dtype=np.int64)
+def _heights(
+    mask: Bool[np.ndarray, "rows columns"], rim: Bool[np.ndarray, "rows columns"]
+) -> Int[np.ndarray, " things"]:
+    """Return the heights of connected patches, but those that a rim runs through."""
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(mask.view(np.uint8), connectivity=8)
+    whole = np.ones(len(stats), dtype=bool)
+    whole[labels[rim]] = False
+    whole[0] = False
+    return np.asarray(stats[whole, cv2.CC_STAT_HEIGHT], dtype=np.int64)
 
 
 def _is_in(page: _Page, other: _Page) -> bool:
@@ -173,4 +179,6 @@ def _hold_all(pages: list[_Page], ground: Bool[np.ndarray, "rows columns"]) -> b
     width = max(3, round(STRIP * tallest))
     beside = (~ground & ~around).view(np.uint8)
     thick = cv2.morphologyEx(beside, cv2.MORPH_OPEN, np.ones((width, width), np.uint8)) > 0
-    return int(_heights(thick).max(initial=0)) < AS_TALL * tallest
+    border = np.ones(ground.shape, dtype=bool)
+    border[1:-1, 1:-1] = False
+    return int(_heights(thick, border).max(initial=0)) < AS_TALL * tallest

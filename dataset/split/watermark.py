@@ -17,13 +17,13 @@ from jaxtyping import Bool, Float, Int, UInt8
 from toonset.dataset.split.background import difference
 from toonset.raster import dilate, erode
 
-LEAST_SHARE = 0.004  # of the sheet that has the tone
+LEAST_SHARE = 0.01  # of the sheet that has the tone
 FAINT = (8, 72)  # levels from the paper: the mark's contrast on it
 ABOVE_NOISE = 2  # times the paper's tolerance: what differs by less is grain
-MOST_SAMPLES = 2**20  # of which the tone is the commonest
+LONGEST_PX = 2048  # of the copy in which a mark is looked for
 SAME = 5  # levels: one tone, or one flat colour
 LEAST_SCRAPS = 8
-LEAST_SCRAP = 12  # pixels
+LEAST_SCRAP = 24  # pixels
 MOST_OF_HEIGHT = 0.25  # of the sheet: a scrap is no higher
 ON_PAPER = 0.7  # of the scraps' borders that is paper or its blend with the tone
 GRID = (6, 8)  # rows and columns of the sheet
@@ -53,9 +53,12 @@ def find_watermark(
         paper: the background's colour; None where it has none.
         tolerance: the background's noise in levels.
     """
-    faintest = max(FAINT[0], ABOVE_NOISE * tolerance)
-    tone = None if paper is None else _faint_tone(rgb, paper, faintest)
-    if paper is None or tone is None:
+    if paper is None:
+        return None
+    step = -(-max(rgb.shape[:2]) // LONGEST_PX)
+    rgb = np.ascontiguousarray(rgb[::step, ::step])
+    tone = _faint_tone(rgb, paper, max(FAINT[0], ABOVE_NOISE * tolerance))
+    if tone is None:
         return None
     mask = difference(rgb, np.broadcast_to(tone, rgb.shape)) <= SAME
     if np.count_nonzero(mask) < LEAST_SHARE * mask.size:
@@ -83,8 +86,6 @@ def _faint_tone(
     rgb: UInt8[np.ndarray, "height width 3"], paper: tuple[int, int, int], faintest: int
 ) -> UInt8[np.ndarray, " 3"] | None:
     """Return the commonest colour that is a little off the paper's."""
-    step = max(1, round((rgb.size / MOST_SAMPLES) ** 0.5))
-    rgb = np.ascontiguousarray(rgb[::step, ::step])
     away = difference(rgb, np.broadcast_to(np.array(paper, np.uint8), rgb.shape))
     faint = rgb[(away >= faintest) & (away <= FAINT[1])]
     if not len(faint):
