@@ -21,6 +21,7 @@ from toonset.dataset.split.figures.rows import find_groups
 from toonset.raster import dilate, sized_parts, wider_than
 
 SEEN_AT = 280  # cells of a figure's height: outlines of larger figures are closed on coarser ones
+MEASURED_AT = 1000  # cells of the longer side: the figures' height is measured on coarser ones
 LARGEST = 0.03  # of the figure's height: half of the widest gap that is closed in line drawings
 LARGEST_PAINTED = 0.02  # the same in painted ones
 LOOKED_FOR = 0.05  # the same of gaps that are said, not closed
@@ -97,7 +98,8 @@ def close_outlines(walls: Mask, paper: Mask, ring: Mask) -> tuple[Mask, tuple[Ga
         paper: background that the outside reaches.
         ring: cells at the border, where the outside begins.
     """
-    height = _figure_height(~paper)
+    coarse = max(1, max(paper.shape) // MEASURED_AT)
+    height = coarse * _figure_height(_pooled(~paper, coarse))
     step = max(1, round(height / SEEN_AT))
     drawn = _pooled(walls, step)
     outside = _pooled(paper, step) & ~drawn
