@@ -23,6 +23,7 @@ from toonset.raster import wider_than
 MOST_LOST = 0.2  # of a figure that a shadow alone encloses
 LEAST_LOST = 0.01  # of the same, where the shadow is mostly lines
 MOST_BROAD = 0.5  # of a shadow that is mostly lines
+PAINTED = 0.5  # of a figure that is paint broader than lines: it is no line drawing
 
 
 @dataclass(frozen=True)
@@ -115,12 +116,31 @@ class SheetState:
 
 
 def fill_open_outlines(state: SheetState) -> SheetState | None:
-    """Propose figures whose outlines have gaps, with their insides."""
+    """Propose figures whose outlines have gaps, with their insides.
+
+    Where figures are painted, sketches beside them stay as they are.
+    """
     filled, gaps = close_outlines(state.painted & ~state.ruled, state.paper, state.ring)
+    if gaps and _are_painted(state):
+        own = np.zeros_like(filled)
+        for number in state.main_blobs:
+            own[state.blobs.window(int(number))] = True
+        filled, gaps = filled & own, tuple(gap for gap in gaps if own[gap.y, gap.x])
     if not gaps:
         return None
     paper = joined((~state.painted | state.ruled) & ~filled, state.ring)
     return replace(state, filled=filled, gaps=gaps, paper=paper, blobs=find_blobs(~paper))
+
+
+def _are_painted(state: SheetState) -> bool:
+    """Return whether the figures are mostly paint broader than lines."""
+    shares = []
+    for number in state.main_blobs:
+        mask = state.blobs.mask(int(number))
+        paint = state.painted[state.blobs.window(int(number))] & mask
+        broad = wider_than(paint, max(1, round(LINE * len(mask))))
+        shares.append(np.count_nonzero(broad) / np.count_nonzero(mask))
+    return bool(shares) and float(np.median(shares)) >= PAINTED
 
 
 def remove_shadows(state: SheetState) -> SheetState | None:
