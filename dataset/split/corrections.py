@@ -14,9 +14,9 @@ import numpy as np
 from jaxtyping import Bool, Int, UInt8
 
 from toonset.dataset.split.figures.blobs import Blobs, add_blocks, find_blobs, remove_strangers
+from toonset.dataset.split.figures.open_outlines import LINE, Gap, close_outlines
 from toonset.dataset.split.figures.rows import Group, find_groups
 from toonset.dataset.split.figures.shadows import find_shadows
-from toonset.dataset.split.open_outlines import LINE, Gap, close_outlines
 from toonset.dataset.split.touching.cut import Cut, part_touching
 from toonset.raster import wider_than
 

@@ -23,7 +23,7 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from toonset.dataset.split.background import difference
-from toonset.dataset.split.open_outlines import LEAST_POCKET, LINE, line_walls
+from toonset.dataset.split.figures.open_outlines import LEAST_POCKET, LINE, line_walls
 from toonset.raster import depth_inside, dilate, distance_to, erode, sized_parts, wider_than
 from toonset.view import over_white
 

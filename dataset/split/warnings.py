@@ -8,8 +8,8 @@ from jaxtyping import UInt8
 from toonset.dataset.split.background import SURE_ENOUGH, Background
 from toonset.dataset.split.figures.blobs import Blobs, shared_colors
 from toonset.dataset.split.figures.grouping import LEAST_PART
+from toonset.dataset.split.figures.open_outlines import LINE, Gap
 from toonset.dataset.split.figures.rows import LOWEST
-from toonset.dataset.split.open_outlines import LINE, Gap
 from toonset.dataset.split.pages import Pages
 from toonset.dataset.split.segment import SheetLayout, figure_cells
 from toonset.dataset.split.watermark import Watermark
