@@ -20,6 +20,8 @@ from toonset.raster import dilate, erode
 LEAST_SHARE = 0.01  # of the sheet that has the tone
 FAINT = (8, 72)  # levels from the paper: the mark's contrast on it
 LONGEST_PX = 2048  # of the copy in which a mark is looked for
+NEARER = (0.3, 0.7)  # of the tone's contrast: levels that only edges of letters and grain have
+PEAK = 0.5  # of the commonest of these
 SAME = 5  # levels: one tone, or one flat colour
 LEAST_SCRAPS = 8
 LEAST_SCRAP = 24  # pixels
@@ -78,14 +80,17 @@ def find_watermark(
 def _faint_tone(
     rgb: UInt8[np.ndarray, "height width 3"], paper: tuple[int, int, int]
 ) -> UInt8[np.ndarray, " 3"] | None:
-    """Return the commonest colour that is a little off the paper's."""
+    """Return the commonest colour that is a little off the paper's, a peak apart from its grain."""
     away = difference(rgb, np.broadcast_to(np.array(paper, np.uint8), rgb.shape))
     faint = rgb[(away >= FAINT[0]) & (away <= FAINT[1])]
     if not len(faint):
         return None
     bins = (faint >> 2).astype(np.int32) @ np.array([4096, 64, 1], np.int32)
-    chosen = faint[bins == np.bincount(bins).argmax()]
-    return np.median(chosen, axis=0).astype(np.uint8)
+    tone = np.median(faint[bins == np.bincount(bins).argmax()], axis=0).astype(np.uint8)
+    level = int(np.abs(tone.astype(int) - paper).max())
+    often = np.convolve(np.bincount(away.ravel(), minlength=256), np.ones(3), "same")
+    nearer = often[round(NEARER[0] * level) : round(NEARER[1] * level) + 1].max()
+    return tone if often[level] >= PEAK * nearer else None
 
 
 def _is_all_over(centers: Float[np.ndarray, "n 2"], shape: tuple[int, int]) -> bool:
