@@ -253,10 +253,14 @@ def _cell(
     bins = lattice.bins
     number = _bin(u, bins[0]) * bins[1] + _bin(v, bins[1])
     cell = _medians(rgb[rows, columns], number, bins[0] * bins[1]).reshape(*bins, 3)
-    wide = np.pad(cell, ((1, 1), (1, 1), (0, 0)), mode="wrap")
-    kernel = np.ones((3, 3), np.uint8)
-    low, high = cv2.erode(wide, kernel), cv2.dilate(wide, kernel)
-    return low[1:-1, 1:-1], high[1:-1, 1:-1]
+    shifts = [(down, right) for down in (-1, 0, 1) for right in (-1, 0, 1)]
+    near = np.stack([np.roll(cell, shift, axis=(0, 1)) for shift in shifts])
+    light = near.sum(axis=3, dtype=np.int32)
+    low, high = (
+        np.take_along_axis(near, chosen[None, ..., None], axis=0)[0]
+        for chosen in (light.argmin(axis=0), light.argmax(axis=0))
+    )
+    return low, high
 
 
 def _bin(phase: np.ndarray, bins: int) -> np.ndarray:
@@ -279,14 +283,18 @@ def _medians(
 def _laid(
     rgb: UInt8[np.ndarray, "height width 3"], lattice: Lattice, low: np.ndarray, high: np.ndarray
 ) -> UInt8[np.ndarray, "height width 3"]:
-    """Return the sheet's colours, clipped to those of the pattern at each place."""
+    """Return the blends of the pattern's colours at each place that are nearest to the sheet's."""
     result = np.empty_like(rgb)
     columns = np.arange(rgb.shape[1])[None]
     for top in range(0, len(rgb), 256):
         part = rgb[top : top + 256]
         u, v = lattice.phases(columns, np.arange(top, top + len(part))[:, None])
         place = _bin(u, low.shape[0]), _bin(v, low.shape[1])
-        result[top : top + 256] = np.clip(part, low[place], high[place])
+        start = low[place].astype(np.float32)
+        along = high[place] - start
+        share = ((part - start) * along).sum(axis=2) / np.maximum((along**2).sum(axis=2), 1)
+        blend = start + np.clip(share, 0, 1)[..., None] * along
+        result[top : top + 256] = np.rint(blend)
     return result
 
 

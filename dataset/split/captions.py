@@ -12,6 +12,7 @@ import unicodedata
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from importlib import import_module
 from itertools import combinations
 from typing import Any
 
@@ -243,11 +244,11 @@ def _may_have_captions(found: Segmentation, boxes: Sequence[Box]) -> bool:
 def _reader() -> Callable[[UInt8[np.ndarray, "height width 4"]], list[Text]] | None:
     """Return what reads the texts of a sheet; None where it is not installed."""
     try:
-        import onnxruntime  # noqa: F401, RUF100
-        from rapidocr import RapidOCR
+        import_module("onnxruntime")
+        reader = import_module("rapidocr").RapidOCR
     except ImportError:
         return None
-    engine = RapidOCR(params=SETTINGS)
+    engine = reader(params=SETTINGS)
     return lambda rgba: _read(engine, rgba)
 
 

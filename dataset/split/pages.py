@@ -55,9 +55,10 @@ class Pages:
         self, rgba: UInt8[np.ndarray, "height width 4"]
     ) -> UInt8[np.ndarray, "height width 4"]:
         """Return the picture with the nearest paper in place of what lies around the pages."""
-        _, nearest = cv2.distanceTransformWithLabels(
+        _, found = cv2.distanceTransformWithLabels(
             (~self.paper).view(np.uint8), cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL
         )
+        nearest = np.asarray(found, dtype=np.int32)
         colors = np.zeros((int(nearest.max()) + 1, 4), dtype=np.uint8)
         colors[nearest[self.paper]] = rgba[self.paper]
         return np.where(self.mask[..., None], rgba, colors[nearest])
@@ -158,7 +159,8 @@ def _heights(
     mask: Bool[np.ndarray, "rows columns"], rim: Bool[np.ndarray, "rows columns"]
 ) -> Int[np.ndarray, " things"]:
     """Return the heights of connected patches, but those that a rim runs through."""
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(mask.view(np.uint8), connectivity=8)
+    _, found, stats, _ = cv2.connectedComponentsWithStats(mask.view(np.uint8), connectivity=8)
+    labels = np.asarray(found, dtype=np.int32)
     whole = np.ones(len(stats), dtype=bool)
     whole[labels[rim]] = False
     whole[0] = False

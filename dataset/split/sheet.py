@@ -181,8 +181,7 @@ def split_picture(
     else:
         rgba, residual = remove_residual_alpha(rgba)
     ground = find_background(rgba, options.background_rgb)
-    plain = ground.rgb if ground.kind == "plain" else None
-    mark = find_watermark(rgba[..., :3], plain, ground.tolerance)
+    mark = find_watermark(rgba[..., :3], ground.rgb) if ground.kind == "plain" else None
     if mark is not None:
         rgba = remove_watermark(rgba, mark)
         ground = find_background(rgba, options.background_rgb)

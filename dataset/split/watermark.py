@@ -19,8 +19,9 @@ from toonset.raster import dilate, erode
 
 LEAST_SHARE = 0.01  # of the sheet that has the tone
 FAINT = (8, 72)  # levels from the paper: the mark's contrast on it
-ABOVE_NOISE = 2  # times the paper's tolerance: what differs by less is grain
 LONGEST_PX = 2048  # of the copy in which a mark is looked for
+NEARER = (0.3, 0.7)  # of the tone's contrast: levels that only edges of letters and grain have
+PEAK = 0.5  # of the commonest of these
 SAME = 5  # levels: one tone, or one flat colour
 LEAST_SCRAPS = 8
 LEAST_SCRAP = 24  # pixels
@@ -44,20 +45,14 @@ class Watermark:
 
 
 def find_watermark(
-    rgb: UInt8[np.ndarray, "height width 3"], paper: tuple[int, int, int] | None, tolerance: int
+    rgb: UInt8[np.ndarray, "height width 3"], paper: tuple[int, int, int] | None
 ) -> Watermark | None:
-    """Return the mark that lies all over a sheet of plain paper; None if there is none.
-
-    Args:
-        rgb: the sheet.
-        paper: the background's colour; None where it has none.
-        tolerance: the background's noise in levels.
-    """
+    """Return the mark that lies all over a sheet of plain paper; None if there is none."""
     if paper is None:
         return None
     step = -(-max(rgb.shape[:2]) // LONGEST_PX)
     rgb = np.ascontiguousarray(rgb[::step, ::step])
-    tone = _faint_tone(rgb, paper, max(FAINT[0], ABOVE_NOISE * tolerance))
+    tone = _faint_tone(rgb, paper)
     if tone is None:
         return None
     mask = difference(rgb, np.broadcast_to(tone, rgb.shape)) <= SAME
@@ -83,16 +78,19 @@ def find_watermark(
 
 
 def _faint_tone(
-    rgb: UInt8[np.ndarray, "height width 3"], paper: tuple[int, int, int], faintest: int
+    rgb: UInt8[np.ndarray, "height width 3"], paper: tuple[int, int, int]
 ) -> UInt8[np.ndarray, " 3"] | None:
-    """Return the commonest colour that is a little off the paper's."""
+    """Return the commonest colour that is a little off the paper's, a peak apart from its grain."""
     away = difference(rgb, np.broadcast_to(np.array(paper, np.uint8), rgb.shape))
-    faint = rgb[(away >= faintest) & (away <= FAINT[1])]
+    faint = rgb[(away >= FAINT[0]) & (away <= FAINT[1])]
     if not len(faint):
         return None
     bins = (faint >> 2).astype(np.int32) @ np.array([4096, 64, 1], np.int32)
-    chosen = faint[bins == np.bincount(bins).argmax()]
-    return np.median(chosen, axis=0).astype(np.uint8)
+    tone = np.median(faint[bins == np.bincount(bins).argmax()], axis=0).astype(np.uint8)
+    level = int(np.abs(tone.astype(int) - paper).max())
+    often = np.convolve(np.bincount(away.ravel(), minlength=256), np.ones(3), "same")
+    nearer = often[round(NEARER[0] * level) : round(NEARER[1] * level) + 1].max()
+    return tone if often[level] >= PEAK * nearer else None
 
 
 def _is_all_over(centers: Float[np.ndarray, "n 2"], shape: tuple[int, int]) -> bool:

@@ -248,7 +248,8 @@ def _gap(part: Mask, outside: Mask, width: float, height: float) -> Gap:
 
 def _reached(room: Float[np.ndarray, "rows columns"], free: Mask, seeds: Mask, ball: float) -> Mask:
     """Return the free cells that a ball covers on its way from the seeds."""
-    _, numbers = cv2.connectedComponents(((room > ball) & free).view(np.uint8), connectivity=4)
+    _, found = cv2.connectedComponents(((room > ball) & free).view(np.uint8), connectivity=4)
+    numbers = np.asarray(found, dtype=np.int32)
     touched = np.zeros(int(numbers.max()) + 1, dtype=bool)
     touched[numbers[seeds]] = True
     touched[0] = False

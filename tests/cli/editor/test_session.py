@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from http.client import HTTPConnection
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
@@ -23,6 +23,7 @@ from toonset.cli.editor.refit import CORRECTIONS, Changed, Subject, parts_change
 from toonset.cli.editor.scene import PALETTE, for_page, scene_of
 from toonset.cli.editor.session import Session, StaleError
 from toonset.dataset.bundle.bundle import read_bundle
+from toonset.dataset.bundle.calibration_schema import CalibrationFile
 from toonset.dataset.bundle.check import bundle_problems
 from toonset.dataset.images.picture import encode_png
 from toonset.dataset.split_folder.load import split_sheet
@@ -249,7 +250,8 @@ def test_a_bundle_of_another_outfit_is_opened_as_it_was_cut(tmp_path: Path) -> N
     sheet = tmp_path / "outfits.png"
     sheet.write_bytes(encode_png(make_messy_sheet(4102, ("outfits",)).rgba))
     options = {"outfit": "B"}
-    found = SimpleNamespace(options=options, views=split_sheet(sheet, outfit="B").views)
+    views = split_sheet(sheet, outfit="B").views
+    found = cast(CalibrationFile, SimpleNamespace(options=options, views=views))
     _, corrections = opening._as_it_was_cut(Subject(sheet, None, tmp_path), found)
     assert corrections == {"version": 1, "outfit": "B"}
 

@@ -102,7 +102,7 @@ PATTERNS: dict[str, Callable[[], Picture]] = {
     "polka": lambda: dots(24, 5),
     "diamonds": lambda: np.where(
         (((ROWS + COLUMNS) % 28 < 1) | ((ROWS - COLUMNS) % 28 < 1))[..., None],
-        np.uint8((180, 200, 220)),
+        np.array((180, 200, 220), np.uint8),
         plain(255),
     ),
     "checks": lambda: checks(8),
@@ -142,18 +142,24 @@ def sky_and_floor() -> Picture:
 
 
 STEPS: dict[str, Callable[[], Picture]] = {
-    "horizon": lambda: np.where((ROWS > 180)[..., None], np.uint8((200, 180, 150)), plain(250)),
+    "horizon": lambda: np.where(
+        (ROWS > 180)[..., None], np.array((200, 180, 150), np.uint8), plain(250)
+    ),
     "sloping horizon": lambda: np.where(
-        (ROWS > 170 + 0.03 * COLUMNS)[..., None], np.uint8((200, 180, 150)), plain(250)
+        (ROWS > 170 + 0.03 * COLUMNS)[..., None], np.array((200, 180, 150), np.uint8), plain(250)
     ),
     "soft horizon": lambda: cv2.GaussianBlur(
-        np.where((ROWS > 215)[..., None], np.uint8((110, 160, 100)), plain(255)), (0, 0), 2
+        np.where((ROWS > 215)[..., None], np.array((110, 160, 100), np.uint8), plain(255)),
+        (0, 0),
+        2,
     ),
-    "halves": lambda: np.where((COLUMNS > 400)[..., None], np.uint8((70, 60, 60)), plain(255)),
+    "halves": lambda: np.where(
+        (COLUMNS > 400)[..., None], np.array((70, 60, 60), np.uint8), plain(255)
+    ),
     "three panels": lambda: np.where(
         (COLUMNS > 533)[..., None],
-        np.uint8((230, 215, 200)),
-        np.where((COLUMNS > 266)[..., None], np.uint8((200, 220, 230)), plain(255)),
+        np.array((230, 215, 200), np.uint8),
+        np.where((COLUMNS > 266)[..., None], np.array((200, 220, 230), np.uint8), plain(255)),
     ),
     "sky": sky_and_floor,
     "scanner's edge": lambda: np.where((COLUMNS > 786)[..., None], np.uint8(40), plain(248)),
@@ -221,7 +227,7 @@ def test_paper_on_a_desk_is_cut_and_told() -> None:
         cv2.warpPerspective(np.full(mask.shape, 255, np.uint8), matrix, (900, 400)),
     )
     truth = cv2.warpPerspective(mask.view(np.uint8), matrix, (900, 400)) > 0
-    photo = np.where(cover[..., None] > 127, photo, np.uint8((100, 70, 50)))
+    photo = np.where(cover[..., None] > 127, photo, np.array((100, 70, 50), np.uint8))
     found = assert_right(opaque(jpeg(photo, 90)), truth)
     assert any("lies at an angle" in line for line in found.warnings)
 
