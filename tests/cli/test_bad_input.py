@@ -68,7 +68,10 @@ def test_a_bad_mesh(name, drawn: Path, toonset, snapshot, tmp_path, monkeypatch)
             ["synth", "mannequin.obj", "--views", "0", "-o", "x"],
             "views is 0, 1 to 360 is needed; change it",
         ),
-        (["palette", "sheet.png", "--keep", "x"], "nor a palette file (.gpl, .ase, .aco, .json"),
+        (
+            ["palette", "sheet.png", "--keep", "x"],
+            "nor a palette file (.gpl, .ase, .aco, .pal, .json",
+        ),
         (["calibrate", "sheet.png", "--mesh", "sheet.png"], "sheet.png: is a PNG picture, no mesh"),
         (["render", ".", "--turntable", "2", "-o", "x"], "config.json: does not exist"),
     ],

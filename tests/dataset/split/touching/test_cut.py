@@ -37,8 +37,8 @@ def parted(rgb: np.ndarray) -> tuple[list[tuple[int, ...]], list[Cut]]:
     """Return the boxes of the patches from left to right, and the cuts."""
     painted = (rgb != 255).any(axis=-1)
     found = find_blobs(painted)
-    groups = find_groups(found)
-    blobs, cuts = part_touching(found, groups[0].members, painted, rgb)
+    bodies = [group.members for group in find_groups(found)[:1]] or [np.zeros(0, dtype=int)]
+    blobs, cuts = part_touching(found, bodies[0], painted, rgb)
     return sorted(tuple(int(v) for v in box) for box in blobs.boxes), cuts
 
 
