@@ -98,8 +98,7 @@ def fit_steps(
     size_wh = rgb.shape[1], rgb.shape[0]
     small, shrink = shrunk(rgb, LONGEST_PX)
     zones = find_zones(small, shrink, LEAST_PIECE)
-    at_border = cv2.resize(ring.view(np.uint8), zones.labels.shape[::-1], interpolation=0) > 0
-    groups = _of_one_color(zones, small, at_border)
+    groups = _of_one_color(zones, small, _outermost(ring, zones.labels.shape))
     if len(groups) < 2:
         return None
     masks, fields = [], []
@@ -115,6 +114,18 @@ def fit_steps(
     if taken[ring].mean() < TOGETHER or step < LEAST_STEP:
         return None
     return Plate(_laid(rgb, masks, fields), fields[0].typical, f"{len(groups)} zones at its border")
+
+
+def _outermost(
+    ring: Bool[np.ndarray, "height width"], shape: tuple[int, ...]
+) -> Bool[np.ndarray, "rows columns"]:
+    """Return the outermost cells of a border, which drawn frames do not reach."""
+    cells = cv2.resize(ring.view(np.uint8), shape[::-1], interpolation=cv2.INTER_NEAREST)
+    x, y, width, height = cv2.boundingRect(cells)
+    edge = np.zeros(shape, dtype=bool)
+    edge[y : y + height, x : x + width] = True
+    edge[y + 1 : y + height - 1, x + 1 : x + width - 1] = False
+    return edge
 
 
 def _of_one_color(

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from toonset.dataset.split.background import remove_residual_alpha
-from toonset.dataset.split.background_zones import find_zones
+from toonset.dataset.split.background import remove_residual_alpha, ring_of
+from toonset.dataset.split.background_zones import find_zones, fit_steps
 from toonset.dataset.split.pages import find_pages
 from toonset.dataset.split.sheet import Segmentation, split_picture
 
@@ -298,3 +298,10 @@ def test_zones_end_at_edges() -> None:
     zones = find_zones(picture, 1.0, 0.1)
     assert zones.count == 2
     assert zones.labels[20, 5] != zones.labels[20, 55]
+
+
+def test_a_drawn_frame_on_a_gradient_is_no_step() -> None:
+    shade = np.linspace(215, 150, 500)[:, None, None]
+    sheet = np.broadcast_to(shade, (500, 700, 3)).astype(np.uint8)
+    cv2.rectangle(sheet, (6, 6), (693, 493), BLACK, 7)
+    assert fit_steps(sheet, ring_of(500, 700)) is None
