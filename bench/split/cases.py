@@ -65,7 +65,7 @@ def messy_cases(seed: int, count: int, only: str = "") -> Iterator[SplitCase]:
 
 
 def sheet_cases(folder: Path, only: str = "") -> Iterator[SplitCase]:
-    """Yield sheets of rendered characters: sheet.png, gt.json with `boxes`, views/*.png.
+    """Yield sheets of rendered characters: sheet.png or .jpg, gt.json with `boxes`, views/*.png.
 
     Raises:
         BundleError: the folder holds none whose name contains `only`.
@@ -77,9 +77,8 @@ def sheet_cases(folder: Path, only: str = "") -> Iterator[SplitCase]:
             drawn_at(load_rgba(path)[..., 3], int(cell["sheet_x"]), int(cell["sheet_y"]))
             for path, cell in zip(views, cells, strict=True)
         ]
-        yield SplitCase(
-            place.name, "rendered sheets", load_rgba(place / "sheet.png"), tuple(figures)
-        )
+        (sheet,) = place.glob("sheet.*")
+        yield SplitCase(place.name, "rendered sheets", load_rgba(sheet), tuple(figures))
 
 
 def sprite_sheet_cases(folder: Path, only: str = "") -> Iterator[SplitCase]:

@@ -8,9 +8,11 @@ between arm and body) if all of this holds:
 - nothing lies inside it (an eye has a pupil),
 - a limb divides it from the outside: neither only a line (white clothes reach up to the outline)
   nor half of the body (a white bag, a button),
-- a line or another colour runs all round it: it does not fade into a shade of its own colour,
+- a line or another colour runs all round it: it does not fade into a shade of its own colour; but
+  between the feet a shadow on the ground may close it,
 - its border looks like the figure's outline: as inked as that, and without soft shades beside it
-  (a white shirt has folds and borders on skin without the contour line),
+  (a white shirt has folds and borders on skin without the contour line); but beside light paint of
+  another tint (cream trousers on cream paper) it is enough that the patch has the paper's tint,
 - most of the figure is in other colours (else it is a line drawing, whose paper is its body).
 """
 
@@ -29,6 +31,7 @@ from toonset.view import over_white
 
 LEAST_HOLE_PX = 9
 LEAST_ISLAND_PX = 4
+LEAST_ISLAND = 0.008  # of the figure's height, its side: smaller is the paper's grain
 LINE_ART = 0.5  # of the figure without its lines: more in the background's colour is a line drawing
 EDGE_PX = 2.0  # of a figure on transparency: its soft edge
 INK_LUMA = 64  # of 255: darker is ink
@@ -40,8 +43,13 @@ MOST_THIN = 0.15  # of the border behind so thin a wall
 THICK_WALL = 0.2  # of the figure's height: no limb but the body
 CLEAR = 40  # levels from the background: a line or another colour
 MOST_FADING = 0.1  # of the border
-AS_INKED = 0.5  # of the outline's share of ink
+AT_THE_FEET = 0.1  # of the figure's height from its bottom: where a gap ends on the ground
+SHADED = 0.15  # of such a gap's height, its lowest: a shadow may lie there
+AS_INKED = 0.65  # of the outline's share of ink
 SLACK = 0.05  # of the border: the shares of a short border are rough
+PAPER_TINT = 3.0  # levels, of a patch's mean: nearer to the background is paper beside light paint
+PAINT_TINT = 6.0  # levels: farther is light paint
+LEAST_PAINT = 0.5  # of a patch's area: so much light paint tells what paper is
 
 
 @dataclass(frozen=True)
@@ -124,6 +132,8 @@ def open_holes(
     _, labels, stats, _ = cv2.connectedComponentsWithStats(
         enclosed.astype(np.uint8), connectivity=4
     )
+    tints = _tints(labels, len(stats), rgb, background)
+    light_paint = int(stats[1:, cv2.CC_STAT_AREA][tints[1:] > PAINT_TINT].sum())
     result, opened = mask.copy(), 0
     rows = np.flatnonzero(mask.any(axis=1))
     top, height = int(rows[0]), int(rows[-1] - rows[0]) + 1
@@ -134,11 +144,15 @@ def open_holes(
             continue
         window = _window(stats[number], labels.shape)
         patch = labels[window] == number
-        look = _look(patch, (mask & ~enclosed)[window], contrast[window], luma[window])
-        if not _is_behind_a_limb(patch, depth[window], height):
+        shown = _above_the_ground(stats[number], window, top + height, height)
+        look = _look(patch, (mask & ~enclosed)[window] & shown, contrast[window], luma[window])
+        if not _is_behind_a_limb(patch, shown, depth[window], height):
             continue
-        fades = _fading(patch, contrast[window]) > MOST_FADING
-        if look.could_belong_to(outline) and not fades and not _has_islands(patch):
+        fades = _fading(patch, shown, contrast[window]) > MOST_FADING
+        told_apart = light_paint >= LEAST_PAINT * stats[number, cv2.CC_STAT_AREA]
+        is_paper = told_apart and tints[number] <= PAPER_TINT
+        looks_empty = is_paper or look.could_belong_to(outline)
+        if looks_empty and not fades and not _has_islands(patch, LEAST_ISLAND * height):
             result[window] &= ~patch
             opened += 1
     return result, opened
@@ -208,21 +222,42 @@ def with_paper(
     return result, True
 
 
+def _above_the_ground(
+    stat: np.ndarray, window: tuple[slice, slice], bottom: int, tall: int
+) -> Bool[np.ndarray, "height 1"]:
+    """Return the rows of a patch's window whose border tells what it is: not a shadow between feet.
+
+    Args:
+        stat: the patch, as OpenCV measures it.
+        window: around it.
+        bottom: row below the figure.
+        tall: the figure's height.
+    """
+    high, ends = stat[cv2.CC_STAT_HEIGHT], stat[cv2.CC_STAT_TOP] + stat[cv2.CC_STAT_HEIGHT]
+    last = ends - SHADED * high if ends >= bottom - AT_THE_FEET * tall else np.inf
+    return (np.arange(window[0].start, window[0].stop) < last)[:, None]
+
+
 def _is_behind_a_limb(
-    patch: Bool[np.ndarray, "height width"], depth: Float[np.ndarray, "height width"], tall: int
+    patch: Bool[np.ndarray, "height width"],
+    shown: Bool[np.ndarray, "height 1"],
+    depth: Float[np.ndarray, "height width"],
+    tall: int,
 ) -> bool:
-    """Return whether a patch is as far from the outside as a limb is thick."""
-    rim = patch & ~erode(patch)
+    """Return whether a patch is as far from the outside as a limb is thick, in the shown rows."""
+    rim = patch & ~erode(patch) & shown
     walls = depth[rim]
     thin = float((walls <= max(LEAST_WALL_PX, THIN_WALL * tall)).mean())
     return thin <= MOST_THIN and float(walls.min()) <= THICK_WALL * tall
 
 
 def _fading(
-    patch: Bool[np.ndarray, "height width"], contrast: UInt8[np.ndarray, "height width"]
+    patch: Bool[np.ndarray, "height width"],
+    shown: Bool[np.ndarray, "height 1"],
+    contrast: UInt8[np.ndarray, "height width"],
 ) -> float:
     """Return the share of a patch's border beside which nothing differs from the background."""
-    rim = dilate(patch) & ~patch
+    rim = dilate(patch) & ~patch & shown
     around = cv2.dilate(contrast, np.ones((7, 7), np.uint8))
     return float((around[rim] < CLEAR).mean()) if rim.any() else 0.0
 
@@ -240,6 +275,21 @@ def _look(
     )
 
 
+def _tints(
+    labels: np.ndarray, count: int, rgb: np.ndarray, background: np.ndarray
+) -> Float[np.ndarray, " labels"]:
+    """Return how far each patch's mean colour is from the background's, levels of its worst band.
+
+    A patch's edge pixels are left out where it has others.
+    """
+    own = np.where(erode(labels > 0), labels, 0)
+    numbers = np.where(np.isin(np.arange(count), own)[labels], own, labels).ravel()
+    counts = np.maximum(np.bincount(numbers, minlength=count), 1)
+    away = rgb.astype(np.float64) - background
+    bands = [np.bincount(numbers, away[..., c].ravel(), count) / counts for c in range(3)]
+    return np.abs(bands).max(axis=0)
+
+
 def _window(stat: np.ndarray, shape: tuple[int, int]) -> tuple[slice, slice]:
     x, y, width, height = (int(value) for value in stat[:4])
     return (
@@ -248,9 +298,9 @@ def _window(stat: np.ndarray, shape: tuple[int, int]) -> tuple[slice, slice]:
     )
 
 
-def _has_islands(patch: Bool[np.ndarray, "height width"]) -> bool:
-    """Return whether something lies inside the patch."""
+def _has_islands(patch: Bool[np.ndarray, "height width"], least_px: float) -> bool:
+    """Return whether something at least so many pixels wide lies inside the patch."""
     outside = np.pad(~patch, 1, constant_values=True).astype(np.uint8)
     _, _, stats, _ = cv2.connectedComponentsWithStats(outside, connectivity=8)
     sizes = np.sort(stats[1:, cv2.CC_STAT_AREA])[::-1]  # the largest is the surroundings
-    return bool((sizes[1:] >= LEAST_ISLAND_PX).any())
+    return bool((sizes[1:] >= max(LEAST_ISLAND_PX, least_px**2)).any())

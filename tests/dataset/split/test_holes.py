@@ -1,0 +1,69 @@
+"""Gaps between the legs: the paper shows there, whatever lies on the ground and whoever wears it."""
+
+import cv2
+import numpy as np
+import pytest
+
+from tests.dataset.split.test_grounds import opaque
+from toonset.dataset.split.sheet import split_picture
+
+PAPER = (253, 246, 232)
+RED, NAVY, INK = (196, 60, 44), (30, 50, 110), (12, 12, 16)
+CREAM, TAN, SHADOW = (250, 239, 221), (176, 150, 122), (222, 206, 186)
+TALL, WIDE = 420, 300
+
+
+def standing(
+    trousers: tuple[int, int, int],
+    shadow: tuple[int, int, int] | None,
+    line: int,
+    ink: tuple[int, int, int] = INK,
+) -> np.ndarray:
+    """Return a figure with legs apart on grainy paper, and a shadow between its feet."""
+    picture = np.full((TALL, WIDE, 3), PAPER, np.uint8)
+    parts = [((60, 150), (240, 260), RED), ((70, 250), (108, 380), trousers)]
+    parts += [((192, 250), (230, 380), trousers), ((65, 370), (112, 390), INK)]
+    parts += [((188, 370), (235, 390), INK), ((110, 40), (190, 150), INK)]
+    if shadow is not None:
+        cv2.ellipse(picture, (150, 388), (105, 3), 0, 0, 360, shadow, -1)
+    for first, last, _ in parts:
+        cv2.rectangle(picture, first, last, ink, 2 * line)
+    for first, last, color in parts:
+        cv2.rectangle(picture, first, last, color, -1)
+    grain = np.random.default_rng(0).normal(0, 3, picture.shape)
+    return np.clip(picture + grain, 0, 255).astype(np.uint8)
+
+
+def alpha_at(picture: np.ndarray, x: int, y: int) -> int:
+    (view,) = split_picture(opaque(picture)).views
+    return int(view.rgba[y - view.box[1], x - view.box[0], 3])
+
+
+def test_a_shadow_on_the_ground_does_not_fill_the_gap_between_the_legs() -> None:
+    picture = standing(NAVY, (120, 110, 100), line=3)
+    assert alpha_at(picture, 150, 320) == 0
+    assert alpha_at(picture, 88, 320) == 255
+
+
+@pytest.mark.parametrize("shadow", [SHADOW, (150, 140, 128)])
+def test_trousers_nearly_as_light_as_the_paper_stay_and_the_gap_between_them_opens(
+    shadow: tuple[int, int, int],
+) -> None:
+    picture = standing(CREAM, shadow, line=1, ink=TAN)
+    assert alpha_at(picture, 150, 320) == 0
+    assert alpha_at(picture, 88, 320) == 255
+
+
+def test_a_white_panel_of_a_skirt_is_no_gap_though_it_ends_on_the_ground() -> None:
+    picture = standing(NAVY, None, line=3)
+    cv2.rectangle(picture, (108, 380), (192, 390), INK, -1)  # its hem
+    cv2.rectangle(picture, (111, 262), (189, 383), PAPER, -1)
+    for y in range(280, 380, 20):  # folds
+        cv2.line(picture, (112, y), (188, y + 8), (225, 218, 205), 2)
+    assert alpha_at(picture, 150, 300) == 255
+
+
+def test_a_speck_of_the_grain_in_a_gap_is_no_button() -> None:
+    picture = standing(NAVY, (120, 110, 100), line=3)
+    picture[310:312, 150:153] = (150, 145, 138)
+    assert alpha_at(picture, 150, 330) == 0
