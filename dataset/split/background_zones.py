@@ -15,7 +15,7 @@ from jaxtyping import Bool, Int, UInt8
 
 from toonset.dataset.split.background_field import Field, fit_zone
 from toonset.dataset.split.background_pattern import Plate
-from toonset.raster import dilate
+from toonset.raster import dilate, from_nearest
 
 LONGEST_PX = 1600  # of the copy in which steps are looked for
 MEDIAN_PX = 5  # grain and thin lines are no edges
@@ -164,12 +164,7 @@ def _laid(
     numbers = np.zeros(rgb.shape[:2], dtype=np.int32)
     for k, mask in enumerate(masks):
         numbers[mask] = k + 1
-    _, nearest = cv2.distanceTransformWithLabels(
-        (numbers == 0).view(np.uint8), cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    of_label = np.zeros(int(nearest.max()) + 1, dtype=np.int32)
-    of_label[nearest[numbers > 0]] = numbers[numbers > 0]
-    zone = of_label[nearest]
+    zone = from_nearest(numbers, numbers > 0)
     plate = np.zeros_like(rgb)
     low, high = np.full_like(rgb, 255), np.zeros_like(rgb)
     met = np.zeros(rgb.shape[:2], dtype=np.uint8)

@@ -9,46 +9,20 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import cv2
 import numpy as np
 from jaxtyping import Bool, Int, UInt8
 
 from toonset.dataset.split.figures.blobs import Blobs, add_blocks, find_blobs, remove_strangers
 from toonset.dataset.split.figures.open_outlines import LINE, Gap, close_outlines
-from toonset.dataset.split.figures.rows import Group, find_groups
+from toonset.dataset.split.figures.rows import Group, Taken, find_groups
 from toonset.dataset.split.figures.shadows import find_shadows
 from toonset.dataset.split.touching.cut import Cut, part_touching
-from toonset.raster import wider_than
+from toonset.raster import connected_to, wider_than
 
 MOST_LOST = 0.2  # of a figure that a shadow alone encloses
 LEAST_LOST = 0.01  # of the same, where the shadow is mostly lines
 MOST_BROAD = 0.5  # of a shadow that is mostly lines
 PAINTED = 0.5  # of a figure that is paint broader than lines: it is no line drawing
-
-
-@dataclass(frozen=True)
-class Taken:
-    """Which figures of a sheet are wanted.
-
-    Attributes:
-        group: number of the group, from 0, the likeliest turnaround.
-        outfit: number of its row, from 0; None: all of them.
-    """
-
-    group: int = 0
-    outfit: int | None = None
-
-    def of(self, groups: tuple[Group, ...]) -> Int[np.ndarray, " bodies"]:
-        """Return the figures' numbers; none where there is no such group or row."""
-        if self.group >= len(groups):
-            return np.zeros(0, dtype=int)
-        group = groups[self.group]
-        if self.outfit is None:
-            return group.members
-        return group.rows[self.outfit] if self.outfit < len(group.rows) else np.zeros(0, dtype=int)
-
-
-LIKELIEST = Taken()
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,10 +73,20 @@ class SheetState:
         taken: Taken,
     ) -> SheetState:
         """Return what is known before anything is corrected."""
-        paper = joined(~painted | ruled, ring)
-        shadow = np.zeros_like(painted)
-        known = rgba, ground, tolerance, painted, ring, ruled, shadow
-        return cls(*known, paper, find_blobs(~paper), taken)
+        nothing = np.zeros_like(painted)
+        known = rgba, ground, tolerance, painted, ring, ruled
+        return cls(*known, nothing, nothing, find_blobs(nothing), taken).with_paper()
+
+    @property
+    def free(self) -> Bool[np.ndarray, "rows columns"]:
+        """Return the cells that are paper if the outside reaches them."""
+        free = ~self.painted | self.ruled | self.shadow
+        return free if self.filled is None else free & ~self.filled
+
+    def with_paper(self) -> SheetState:
+        """Return the sheet with its paper and patches found again."""
+        paper = connected_to(self.ring, self.free)
+        return replace(self, paper=paper, blobs=find_blobs(~paper))
 
     @cached_property
     def groups(self) -> tuple[Group, ...]:
@@ -128,8 +112,7 @@ def fill_open_outlines(state: SheetState) -> SheetState | None:
         filled, gaps = filled & own, tuple(gap for gap in gaps if own[gap.y, gap.x])
     if not gaps:
         return None
-    paper = joined((~state.painted | state.ruled) & ~filled, state.ring)
-    return replace(state, filled=filled, gaps=gaps, paper=paper, blobs=find_blobs(~paper))
+    return replace(state, filled=filled, gaps=gaps).with_paper()
 
 
 def _are_painted(state: SheetState) -> bool:
@@ -149,28 +132,16 @@ def remove_shadows(state: SheetState) -> SheetState | None:
         return None
     seen = state.rgba, state.ground, state.tolerance
     shadow = find_shadows(state.blobs, state.main_blobs, *seen)
-    paper = _paper(state, shadow)
-    lines = _outlines(state, shadow, paper)
-    if lines.any():  # a pencil's grey
-        shadow = shadow & ~lines
-        paper = _paper(state, shadow)
-    if not shadow.any():
-        return None
-    return replace(state, shadow=shadow, paper=paper, blobs=find_blobs(~paper))
-
-
-def _paper(state: SheetState, shadow: Bool[np.ndarray, "rows columns"]) -> np.ndarray:
-    free = ~state.painted | state.ruled | shadow
-    return joined(free if state.filled is None else free & ~state.filled, state.ring)
+    shadow = shadow & ~_outlines(state, shadow)  # a pencil's grey
+    return replace(state, shadow=shadow).with_paper() if shadow.any() else None
 
 
 def _outlines(
-    state: SheetState,
-    shadow: Bool[np.ndarray, "rows columns"],
-    paper: Bool[np.ndarray, "rows columns"],
+    state: SheetState, shadow: Bool[np.ndarray, "rows columns"]
 ) -> Bool[np.ndarray, "rows columns"]:
     """Return the shadows without which much of their figure is paper: they are its outline."""
     labels, areas = state.blobs.labels, state.blobs.areas
+    paper = connected_to(state.ring, replace(state, shadow=shadow).free)
     lost = np.bincount(labels[paper & ~shadow], minlength=len(areas) + 1)[1:]
     height = float(np.median(state.blobs.boxes[state.main_blobs, 3]))
     thick = wider_than(shadow, max(1, round(LINE * height)))
@@ -205,15 +176,3 @@ CORRECTIONS: Mapping[str, Callable[[SheetState], SheetState | None]] = {
     "blocky figures": add_blocky_figures,
     "strangers": drop_strangers,
 }
-
-
-def joined(
-    free: Bool[np.ndarray, "height width"], seeds: Bool[np.ndarray, "height width"]
-) -> Bool[np.ndarray, "height width"]:
-    """Return the free pixels that are connected to a seed through free pixels."""
-    _, found = cv2.connectedComponents(free.view(np.uint8), connectivity=4)
-    labels = np.asarray(found, dtype=np.int32)
-    touched = np.zeros(int(labels.max()) + 1, dtype=bool)
-    touched[labels[seeds]] = True
-    touched[0] = False
-    return touched[labels]

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Int
 
-from toonset.dataset.split.corrections import joined
 from toonset.dataset.split.segment import SheetLayout, figure_cells, in_pixels
 from toonset.errors import SheetError
-from toonset.raster import dilate
+from toonset.raster import connected_to, dilate
 from toonset.view import Box
 
 LEAST_CELL_PX = 16  # pixels of paint in a cell of a grid: less is an empty cell
@@ -118,7 +117,7 @@ def _crop(
     filled = None if found.filled is None else in_pixels(found.filled, found.cell_px, box)
     if found.cell_px > 1:
         free = ~drawn if filled is None else ~drawn & ~filled
-        paper = joined(free, paper & free)
+        paper = connected_to(paper & free, free)
     solid = own & ~paper & ~in_pixels(found.shadow, found.cell_px, box)
     enclosed = solid & ~drawn
     return Crop(box, solid, enclosed, None if filled is None else enclosed & filled)

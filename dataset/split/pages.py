@@ -15,7 +15,7 @@ from jaxtyping import Bool, Int, UInt8
 
 from toonset.dataset.split.background import ring_of
 from toonset.dataset.split.background_zones import LEAST_ZONE, find_zones, shrunk
-from toonset.raster import dilate
+from toonset.raster import dilate, from_nearest
 
 LONGEST_PX = 800  # of the copy in which pages are looked for
 LEAST_PAGE = 0.03  # of the picture
@@ -55,13 +55,7 @@ class Pages:
         self, rgba: UInt8[np.ndarray, "height width 4"]
     ) -> UInt8[np.ndarray, "height width 4"]:
         """Return the picture with the nearest paper in place of what lies around the pages."""
-        _, found = cv2.distanceTransformWithLabels(
-            (~self.paper).view(np.uint8), cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL
-        )
-        nearest = np.asarray(found, dtype=np.int32)
-        colors = np.zeros((int(nearest.max()) + 1, 4), dtype=np.uint8)
-        colors[nearest[self.paper]] = rgba[self.paper]
-        return np.where(self.mask[..., None], rgba, colors[nearest])
+        return np.where(self.mask[..., None], rgba, from_nearest(rgba, self.paper))
 
     def __str__(self) -> str:
         """Return where they are, for people."""

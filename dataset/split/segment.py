@@ -14,11 +14,11 @@ import numpy as np
 from jaxtyping import Bool, Int, UInt8
 
 from toonset.dataset.split.background import Background, difference, ring_of, with_final_tolerance
-from toonset.dataset.split.corrections import CORRECTIONS, LIKELIEST, SheetState, Taken
+from toonset.dataset.split.corrections import CORRECTIONS, SheetState
 from toonset.dataset.split.figures.blobs import Blobs
 from toonset.dataset.split.figures.grouping import Grouping, group_blobs
 from toonset.dataset.split.figures.open_outlines import Gap
-from toonset.dataset.split.figures.rows import Group
+from toonset.dataset.split.figures.rows import LIKELIEST, Group, Taken
 from toonset.dataset.split.ruled_lines import Line, find_lines, line_pixels
 from toonset.dataset.split.touching.cut import Cut
 from toonset.errors import SheetError

@@ -20,9 +20,9 @@ from toonset.dataset.split.background import (
     is_transparent,
     remove_residual_alpha,
 )
-from toonset.dataset.split.corrections import LIKELIEST, Taken
 from toonset.dataset.split.crop import Crop, boxed_crops, found_crops, grid_crops
 from toonset.dataset.split.figures.blobs import as_box
+from toonset.dataset.split.figures.rows import LIKELIEST, Taken
 from toonset.dataset.split.figures.text_and_swatches import words
 from toonset.dataset.split.holes import BorderLook, open_holes, outline_look, with_paper
 from toonset.dataset.split.matting import cut_out, edge_softness_px

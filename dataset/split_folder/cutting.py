@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from toonset.dataset.split.corrections import Taken
+from toonset.dataset.split.figures.rows import Taken
 from toonset.errors import PaletteError, SheetError, UsageError
 from toonset.palette.formats.hex import rgb_of_typed
 

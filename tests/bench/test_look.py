@@ -39,7 +39,10 @@ PAGE = {page.name: page for page in PAGES}
 def test_a_folder_without_cases_and_a_name_that_fits_none(tmp_path: Path, bench) -> None:
     with pytest.raises(BundleError, match="holds no case"):
         list(look_cases(tmp_path, 0, 1))
-    assert "no case's name contains 'nobody'" in bench("look", "--only", "nobody", "-o", tmp_path / "out").reason
+    assert (
+        "no case's name contains 'nobody'"
+        in bench("look", "--only", "nobody", "-o", tmp_path / "out").reason
+    )
 
 
 @pytest.fixture(scope="module")

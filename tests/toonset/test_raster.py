@@ -3,7 +3,16 @@
 import numpy as np
 import pytest
 
-from toonset.raster import LONG_REACH, depth_inside, depth_near_edge, median_inside, sized_parts
+from toonset.raster import (
+    LONG_REACH,
+    connected_to,
+    depth_inside,
+    depth_near_edge,
+    from_nearest,
+    median_inside,
+    nearest,
+    sized_parts,
+)
 
 
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16])
@@ -35,3 +44,23 @@ def test_areas_of_parts_are_counts(share: float) -> None:
     lone = np.zeros((5, 6), dtype=bool)
     lone[1:3, 2:4] = True
     np.testing.assert_array_equal(sized_parts(lone)[1], [26, 4])
+
+
+def test_values_come_from_the_nearest_known_pixel() -> None:
+    known = np.zeros((40, 50), dtype=bool)
+    known[5, 5] = known[30, 40] = True
+    values = np.zeros((40, 50, 3), dtype=np.uint8)
+    values[5, 5], values[30, 40] = 10, 200
+    rows, columns = nearest(known)
+    away = np.indices(known.shape)[:, None] - np.array([[5, 30], [5, 40]])[..., None, None]
+    first, second = np.hypot(*away)
+    clear = np.abs(first - second) > 1  # the distances are rough
+    assert np.array_equal(from_nearest(values, known)[clear], values[rows, columns][clear])
+
+
+def test_what_is_connected_to_a_seed_reaches_it_by_sides_not_by_corners() -> None:
+    free = np.array([[1, 1, 0, 1], [0, 0, 1, 0], [0, 0, 1, 1]], dtype=bool)
+    seeds = np.zeros_like(free)
+    seeds[2, 3] = seeds[1, 0] = True  # the second one is not free
+    found = connected_to(seeds, free)
+    assert found.tolist() == [[False] * 4, [False, False, True, False], [False, False, True, True]]

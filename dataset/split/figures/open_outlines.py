@@ -18,7 +18,7 @@ from jaxtyping import Bool, Float, Int
 
 from toonset.dataset.split.figures.blobs import find_blobs
 from toonset.dataset.split.figures.rows import find_groups
-from toonset.raster import dilate, sized_parts, wider_than
+from toonset.raster import connected_to, dilate, sized_parts, wider_than
 
 SEEN_AT = 280  # cells of a figure's height: outlines of larger figures are closed on coarser ones
 MEASURED_AT = 1000  # cells of the longer side: the figures' height is measured on coarser ones
@@ -248,12 +248,7 @@ def _gap(part: Mask, outside: Mask, width: float, height: float) -> Gap:
 
 def _reached(room: Float[np.ndarray, "rows columns"], free: Mask, seeds: Mask, ball: float) -> Mask:
     """Return the free cells that a ball covers on its way from the seeds."""
-    _, found = cv2.connectedComponents(((room > ball) & free).view(np.uint8), connectivity=4)
-    numbers = np.asarray(found, dtype=np.int32)
-    touched = np.zeros(int(numbers.max()) + 1, dtype=bool)
-    touched[numbers[seeds]] = True
-    touched[0] = False
-    return free & (_distance(touched[numbers]) <= ball + 0.5)
+    return free & (_distance(connected_to(seeds, (room > ball) & free)) <= ball + 0.5)
 
 
 def _distance(marked: Mask) -> Float[np.ndarray, "rows columns"]:

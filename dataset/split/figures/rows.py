@@ -24,12 +24,10 @@ LARGE = 0.02  # of the largest patch's area: smaller things make no group
 AS_HIGH = 0.88  # of a row's height: another row that is lower is no part of its group
 MOST_COUNTED = 4  # figures of a group: more speak no more for a turnaround
 ALONE = 0.5  # likeness of a figure alone, to set beside that of figures in a row
-LEAST_COLUMNS = 2  # figures of a row that may be one outfit of several
 SAME_OUTLINE = 0.75  # IoU of two drawings of one direction in other clothes
 CLEARLY_SAME = 0.06  # IoU, mean of a row: so much more alike as they are than mirrored
 ROWS = 64  # at which outlines are compared
-SHIFTED = 0.25  # of the height: so far outlines are shifted to lie on each other
-MOST_COMPARED = 64  # figures of one group
+MOST_COMPARED = 64  # figures of one group or row
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +57,31 @@ class Group:
         """Return how much speaks for a turnaround: size, number, and outlines that come again."""
         counted = min(len(self.members), MOST_COUNTED)
         return counted * self.height**3 * self.likeness
+
+
+@dataclass(frozen=True)
+class Taken:
+    """Which figures of a sheet are wanted.
+
+    Attributes:
+        group: number of the group, from 0, the likeliest turnaround.
+        outfit: number of its row, from 0; None: all of them.
+    """
+
+    group: int = 0
+    outfit: int | None = None
+
+    def of(self, groups: tuple[Group, ...]) -> Int[np.ndarray, " bodies"]:
+        """Return the figures' numbers; none where there is no such group or row."""
+        if self.group >= len(groups):
+            return np.zeros(0, dtype=int)
+        group = groups[self.group]
+        if self.outfit is None:
+            return group.members
+        return group.rows[self.outfit] if self.outfit < len(group.rows) else np.zeros(0, dtype=int)
+
+
+LIKELIEST = Taken()
 
 
 def find_groups(blobs: Blobs) -> tuple[Group, ...]:
@@ -135,26 +158,25 @@ def _group(blobs: Blobs, parts: list[np.ndarray], *, alone: bool) -> Group:
     members = np.concatenate(parts)
     order = rows_of(blobs.boxes[members], blobs.centers[members])
     rows = tuple(members[row] for row in order)
-    outlines = {int(n): _outline(blobs, int(n)) for n in members[:MOST_COMPARED]}
     likeness = ALONE**2
     if not alone and len(members) > 1:
-        likeness = float(np.mean(_likeness([*outlines.values()]) ** 2))
+        outlines = [_outline(blobs, int(n)) for n in members[:MOST_COMPARED]]
+        likeness = float(np.mean(_likeness(outlines) ** 2))
     height = float(np.median(blobs.boxes[members, 3]))
-    return Group(rows, height, likeness, _are_outfits(rows, outlines))
+    return Group(rows, height, likeness, _are_outfits(blobs, rows))
 
 
-def _are_outfits(rows: tuple[np.ndarray, ...], outlines: dict[int, np.ndarray]) -> bool:
+def _are_outfits(blobs: Blobs, rows: tuple[np.ndarray, ...]) -> bool:
     """Return whether the rows show the same directions one below the other.
 
     A second row of a turnaround goes on turning: its outlines are mirror images of the first's.
     """
-    counts = {len(row) for row in rows}
-    if len(rows) < 2 or len(counts) > 1 or len(rows[0]) < LEAST_COLUMNS:
+    columns = {len(row) for row in rows}
+    if len(rows) < 2 or len(columns) > 1 or not 2 <= max(columns) <= MOST_COMPARED:
         return False
-    if sum(len(row) for row in rows) > len(outlines):
-        return False
-    for row in rows[1:]:
-        pairs = [(outlines[int(a)], outlines[int(b)]) for a, b in zip(rows[0], row, strict=True)]
+    first, *others = [[_outline(blobs, int(number)) for number in row] for row in rows]
+    for row in others:
+        pairs = [*zip(first, row, strict=True)]
         same = np.array([_overlap(a, b) for a, b in pairs])
         turned = np.array([_overlap(a, b[:, ::-1]) for a, b in pairs])
         if same.min() < SAME_OUTLINE or (same - turned).mean() < CLEARLY_SAME:

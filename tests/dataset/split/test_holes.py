@@ -1,4 +1,4 @@
-"""Gaps between the legs: the paper shows there, whatever lies on the ground and whoever wears it."""
+"""Gaps between the legs: paper shows there, whatever lies on the ground."""
 
 import cv2
 import numpy as np

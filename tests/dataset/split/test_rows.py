@@ -5,9 +5,8 @@ import pytest
 
 from bench.messy.sheet import MessySheet, make_messy_sheet
 from tests.dataset.split.test_messy_sheets import iou
-from toonset.dataset.split.corrections import Taken
 from toonset.dataset.split.figures.blobs import find_blobs
-from toonset.dataset.split.figures.rows import find_groups
+from toonset.dataset.split.figures.rows import Taken, find_groups
 from toonset.dataset.split.sheet import Segmentation, SheetOptions, split_picture
 from toonset.errors import SheetError
 
