@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import pairwise
 
+import cv2
 import numpy as np
 
 from bench.messy.cast import Brief
@@ -48,7 +49,8 @@ def plan_margins(
     widths = [s.shape[1] for s in (title, None if upright else strip, name) if s is not None]
     return Margins(
         Spacing(
-            margin=round(unit * float(rng.uniform(0.06, 0.25))) + frame_px("frame" in chosen),
+            margin=round(unit * float(rng.uniform(0.06, 0.25)))
+            + frame_px(bool({"frame", "hand frame"} & chosen)),
             gap=max(round(unit * _gap(chosen, rng)), 4),
             leading=max(round(unit * float(rng.uniform(0.08, 0.3))), 8),
             text_gap=max(round(unit * float(rng.uniform(0.025, 0.08))), 4),
@@ -123,6 +125,7 @@ def _both_views(left: Placed, right: Placed) -> bool:
 
 INSETS = (0, 3, 8)  # px from the sheet's edge to its frame
 WIDEST_PEN, BETWEEN = 5, 3  # px; of a frame's lines
+FAR_PX, UNSTEADY_PX = 12, 2.5  # a hand's line from the sheet's edge, and off the straight line
 GUIDES: tuple[Rgb, ...] = ((150, 190, 230), (190, 190, 190), (230, 140, 140))
 
 
@@ -133,6 +136,8 @@ def rule_lines(
     width = layout.size_wh[0]
     if "frame" in chosen:
         _frame(canvas, layout.size_wh, rgb, rng)
+    if "hand frame" in chosen:
+        _frame_by_hand(canvas, layout.size_wh, rgb, rng)
     if "cells" in chosen:
         pen = int(rng.integers(1, 4))
         for row in layout.rows:
@@ -181,3 +186,19 @@ def _dashed(canvas: Canvas, y: int, width: int, pen: int, dash: int, rgb: Rgb) -
         canvas.rule(0, y, width, pen, rgb, 1.0)
     for x in range(0, width, 2 * dash) if dash else ():
         canvas.rule(x, y, dash, pen, rgb, 1.0)
+
+
+def _frame_by_hand(
+    canvas: Canvas, size_wh: tuple[int, int], rgb: Rgb, rng: np.random.Generator
+) -> None:
+    """Draw a line round the sheet that wavers."""
+    corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1), (0, 0)])
+    at = np.linspace(0, 4, 4 * int(rng.integers(8, 25)), endpoint=False)
+    places = np.stack([np.interp(at, range(5), corners[:, axis]) for axis in (0, 1)], axis=1)
+    places = FAR_PX + places * (np.array(size_wh) - 2 * FAR_PX)
+    places += rng.normal(0, float(rng.uniform(0.5, UNSTEADY_PX)), places.shape)
+    cover = np.zeros(size_wh[::-1], np.uint8)
+    line = np.rint(16 * places).astype(np.int32)
+    cv2.polylines(cover, [line], True, 255, int(rng.integers(1, WIDEST_PEN)), cv2.LINE_AA, 4)
+    stamp = np.dstack([np.full((*cover.shape, 3), rgb, np.uint8), cover])
+    canvas.over(stamp, 0, 0)

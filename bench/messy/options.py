@@ -33,7 +33,13 @@ OTHERS = (
     "open contour",
     "signature",
 )
-BESIDE = ("poses", "busts", "outfits", "glued study")  # drawn alone; no part of a mixture
+BESIDE = (
+    "poses",
+    "busts",
+    "outfits",
+    "glued study",
+    "hand frame",
+)  # drawn alone; no part of a mixture
 DIFFICULTIES = (*GROUNDS, *OTHERS, *BESIDE)
 GROUND_SHARES = (0.25, 0.2, 0.15, 0.1, 0.15, 0.15)  # of a mixture
 # the earlier one stays where both are drawn

@@ -219,7 +219,7 @@ def _refined(
     while True:
         place = middle + times * vector
         peak = _peak_near(lags, place)
-        if peak is None:
+        if peak is None or np.linalg.norm(peak - middle) < NEAREST_PX:
             return vector
         vector = (peak - middle) / times
         times *= 2

@@ -12,12 +12,20 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Int, UInt8
 
-from toonset.dataset.split.figures.blobs import Blobs, add_blocks, find_blobs, remove_strangers
+from toonset.dataset.split.figures.blobs import (
+    Blobs,
+    add_blocks,
+    as_box,
+    find_blobs,
+    remove_strangers,
+)
+from toonset.dataset.split.figures.frames import find_frames, find_strokes
 from toonset.dataset.split.figures.open_outlines import LINE, Gap, close_outlines
 from toonset.dataset.split.figures.rows import Group, Taken, find_groups
 from toonset.dataset.split.figures.shadows import find_shadows
 from toonset.dataset.split.touching.cut import Cut, part_touching
 from toonset.raster import connected_to, wider_than
+from toonset.view import Box
 
 MOST_LOST = 0.2  # of a figure that a shadow alone encloses
 LEAST_LOST = 0.01  # of the same, where the shadow is mostly lines
@@ -35,7 +43,8 @@ class SheetState:
         tolerance: noise of the background, levels.
         painted: cells that are not background.
         ring: cells at the border, where background is paper.
-        ruled: cells of ruled lines.
+        ruled: cells of ruled lines and drawn frames.
+        lines: their boxes.
         shadow: cells of cast shadows.
         paper: cells that the border reaches through background.
         blobs: patches of figures and other things.
@@ -52,6 +61,7 @@ class SheetState:
     painted: Bool[np.ndarray, "rows columns"]
     ring: Bool[np.ndarray, "rows columns"]
     ruled: Bool[np.ndarray, "rows columns"]
+    lines: tuple[Box, ...]
     shadow: Bool[np.ndarray, "rows columns"]
     paper: Bool[np.ndarray, "rows columns"]
     blobs: Blobs
@@ -70,11 +80,12 @@ class SheetState:
         painted: Bool[np.ndarray, "rows columns"],
         ring: Bool[np.ndarray, "rows columns"],
         ruled: Bool[np.ndarray, "rows columns"],
+        lines: tuple[Box, ...],
         taken: Taken,
     ) -> SheetState:
         """Return what is known before anything is corrected."""
         nothing = np.zeros_like(painted)
-        known = rgba, ground, tolerance, painted, ring, ruled
+        known = rgba, ground, tolerance, painted, ring, ruled, lines
         return cls(*known, nothing, nothing, find_blobs(nothing), taken).with_paper()
 
     @property
@@ -82,6 +93,11 @@ class SheetState:
         """Return the cells that are paper if the outside reaches them."""
         free = ~self.painted | self.ruled | self.shadow
         return free if self.filled is None else free & ~self.filled
+
+    def without_lines(self, lines: Bool[np.ndarray, "rows columns"]) -> SheetState:
+        """Return the sheet with more lines taken for paper."""
+        boxes = tuple(as_box(box) for box in find_blobs(lines).boxes)
+        return replace(self, ruled=self.ruled | lines, lines=self.lines + boxes).with_paper()
 
     def with_paper(self) -> SheetState:
         """Return the sheet with its paper and patches found again."""
@@ -97,6 +113,16 @@ class SheetState:
     def main_blobs(self) -> Int[np.ndarray, " bodies"]:
         """Return the numbers of the patches that are bodies of views."""
         return self.taken.of(self.groups) if self.bodies is None else self.bodies
+
+
+def remove_frames(state: SheetState) -> SheetState | None:
+    """Propose the sheet without lines drawn round its figures, and without pieces of such lines."""
+    corrected = state
+    for find in (find_frames, find_strokes):
+        lines = find(corrected.blobs, corrected.painted & ~corrected.ruled)
+        if lines.any():
+            corrected = corrected.without_lines(lines)
+    return None if corrected is state else corrected
 
 
 def fill_open_outlines(state: SheetState) -> SheetState | None:
@@ -170,6 +196,7 @@ def drop_strangers(state: SheetState) -> SheetState | None:
 
 
 CORRECTIONS: Mapping[str, Callable[[SheetState], SheetState | None]] = {
+    "frames": remove_frames,
     "open outlines": fill_open_outlines,
     "shadows": remove_shadows,
     "touching figures": cut_touching_figures,

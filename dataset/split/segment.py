@@ -19,7 +19,7 @@ from toonset.dataset.split.figures.blobs import Blobs
 from toonset.dataset.split.figures.grouping import Grouping, group_blobs
 from toonset.dataset.split.figures.open_outlines import Gap
 from toonset.dataset.split.figures.rows import LIKELIEST, Group, Taken
-from toonset.dataset.split.ruled_lines import Line, find_lines, line_pixels
+from toonset.dataset.split.ruled_lines import find_lines, line_pixels
 from toonset.dataset.split.touching.cut import Cut
 from toonset.errors import SheetError
 from toonset.view import Box
@@ -38,7 +38,7 @@ class SheetLayout:
         paper: (rows, columns) cells that the border reaches through background.
         shadow: (rows, columns) cells of cast shadows.
         ruled: (rows, columns) cells of ruled lines.
-        lines: the ruled lines.
+        lines: boxes (x, y, width, height) in cells of ruled lines and drawn frames.
         blobs: patches of figures and other things.
         grouping: which patch is whose.
         cuts: where touching figures were cut apart.
@@ -52,7 +52,7 @@ class SheetLayout:
     paper: Bool[np.ndarray, "rows columns"]
     shadow: Bool[np.ndarray, "rows columns"]
     ruled: Bool[np.ndarray, "rows columns"]
-    lines: tuple[Line, ...]
+    lines: tuple[Box, ...]
     blobs: Blobs
     grouping: Grouping
     cuts: tuple[Cut, ...]
@@ -112,6 +112,7 @@ def find_layout(
         painted,
         ring_of(painted.shape[0], painted.shape[1], ground.inset),
         line_pixels(painted, lines),
+        tuple(line.box for line in lines),
         taken,
     )
     for name, propose in CORRECTIONS.items():
@@ -122,7 +123,7 @@ def find_layout(
     studies = [cut.study for cut in state.cuts if cut.study is not None]
     grouping = group_blobs(state.blobs, state.main_blobs, state.rgba[..., :3], studies)
     return SheetLayout(
-        *(cell, state.paper, state.shadow, state.ruled, tuple(lines)),
+        *(cell, state.paper, state.shadow, state.ruled, state.lines),
         *(state.blobs, grouping, state.cuts, state.groups, state.taken),
         *(state.filled, state.gaps),
     )

@@ -328,7 +328,7 @@ def _view(cut: UInt8[np.ndarray, "height width 4"], box: Box, name: str) -> View
 
 def _left_out(found: SheetLayout) -> tuple[LeftOut, ...]:
     """Return the patches that are not views, words as one each."""
-    boxes = [(line.box, "frame") for line in found.lines]
+    boxes = [(box, "frame") for box in found.lines]
     kinds = np.array(found.grouping.kinds, dtype=object)
     for kind in NAMES:
         own = found.blobs.boxes[kinds == kind]
@@ -392,7 +392,7 @@ def _remarks(
         last = chr(ord("A") + len(found.groups[found.taken.group].rows) - 1)
         said.append(f"the rows show the same directions: take one with --outfit A to {last}")
     if found.lines:
-        said.append(f"ruled lines were taken for paper ({len(found.lines)})")
+        said.append(f"ruled lines and frames were taken for paper ({len(found.lines)})")
     if found.shadow.any():
         said.append("shadows on the ground were left out")
     if cuts:

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.dataset.split.background import SURE_ENOUGH, Background
-from toonset.dataset.split.figures.blobs import Blobs, shared_colors
+from toonset.dataset.split.figures.blobs import RECTANGLE, Blobs, shared_colors
 from toonset.dataset.split.figures.grouping import LEAST_PART
 from toonset.dataset.split.figures.open_outlines import LINE, Gap
 from toonset.dataset.split.figures.rows import LOWEST
@@ -26,7 +26,7 @@ WHOLE = 0.6  # of the sheet that one view's box covers though there is text besi
 WIDE_GAP = 0.05  # of the figure's height: a wider gap may be meant
 LARGE_POCKET = 0.01  # of the figure's squared height: so much more or less changes it
 MOST_STROKES = 0.08  # of a view: with more it is hollow somewhere
-WIDE = 1.8  # times the median width: two figures that touch
+WIDE = 1.25  # times the next widest: two figures, or a figure and a study, that touch
 
 
 def page_warnings(pages: Pages | None) -> tuple[str, ...]:
@@ -65,6 +65,7 @@ def figure_warnings(
         *_open_outlines(found, views),
         *_wide_views(views),
         *_whole_page(found, views, rgba),
+        *_panels(views),
         *_near_parts(found, views),
         *_other_groups(found),
         *_like_views(found, views, rgba),
@@ -126,8 +127,9 @@ def _strokes(view: View) -> tuple[int, int] | None:
 def _wide_views(views: list[View]) -> list[str]:
     said = []
     widths = [view.figure_box[2] for view in views]
+    next_widest = sorted(widths)[-2] if len(views) >= 3 else np.inf
     for view, width in zip(views, widths, strict=True):
-        among_others = len(views) >= 3 and width > WIDE * float(np.median(widths))
+        among_others = width > WIDE * next_widest
         if among_others or width > BROAD * view.figure_box[3]:
             said.append(f"view {view.name} is unusually wide: do two figures touch?")
     return said
@@ -142,6 +144,16 @@ def _whole_page(found: SheetLayout, views: list[View], rgba: np.ndarray) -> list
     return [
         f"view {views[0].name} is most of the sheet, with text beside it: does it hold more than "
         "one figure? crop the sheet to the figures, or give them with --boxes"
+    ]
+
+
+def _panels(views: list[View]) -> list[str]:
+    """Return a line if all views are rectangles: the panels in which the figures stand."""
+    fill = [view.mask.sum() / (view.figure_box[2] * view.figure_box[3]) for view in views]
+    if min(fill) < RECTANGLE:
+        return []
+    return [
+        "every view fills its whole rectangle: if the figures stand on panels, take the panels off"
     ]
 
 

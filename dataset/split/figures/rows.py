@@ -188,7 +188,8 @@ def _outline(blobs: Blobs, number: int) -> Bool[np.ndarray, "rows width"]:
     """Return a patch with what it encloses, `ROWS` high."""
     mask = np.ascontiguousarray(blobs.mask(number)).view(np.uint8)
     width = max(1, round(mask.shape[1] * ROWS / mask.shape[0]))
-    return cv2.resize(255 * mask, (width, ROWS), interpolation=cv2.INTER_AREA) > 127
+    covered = cv2.resize(255 * mask, (width, ROWS), interpolation=cv2.INTER_AREA)
+    return covered > covered.max() // 2  # of what is thin, too, something is left
 
 
 def _likeness(outlines: list[np.ndarray]) -> Float[np.ndarray, " figures"]:

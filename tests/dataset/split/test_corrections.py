@@ -9,7 +9,8 @@ from toonset.errors import SheetError
 
 
 @pytest.mark.parametrize(
-    ("difficulty", "correction"), [("shadows", "shadows"), ("touching", "touching figures")]
+    ("difficulty", "correction"),
+    [("shadows", "shadows"), ("touching", "touching figures"), ("hand frame", "frames")],
 )
 def test_a_sheet_that_needs_a_correction_misses_it(difficulty: str, correction: str) -> None:
     sheet = make_messy_sheet(0, [difficulty])
@@ -28,6 +29,6 @@ def test_a_plain_sheet_needs_none() -> None:
 def test_a_correction_that_is_none_is_refused() -> None:
     rgba = make_messy_sheet(0, ["plain"]).rgba
     with pytest.raises(
-        SheetError, match="no correction 'shade'; choose from open outlines, shadows"
+        SheetError, match="no correction 'shade'; choose from frames, open outlines, shadows"
     ):
         split_picture(rgba, SheetOptions(without=("shade",)))

@@ -57,3 +57,12 @@ def test_a_panel_with_text_beside_it_is_doubted_and_a_figure_alone_is_not() -> N
     cv2.ellipse(panel, (120, 165), (110, 148), 0, 0, 360, (170, 190, 200, 255), -1)
     cv2.putText(panel, "NAME", (4, 14), cv2.FONT_HERSHEY_SIMPLEX, 0.4, (0, 0, 0, 255))
     assert any("most of the sheet" in line for line in split_picture(panel).warnings)
+
+
+def test_figures_that_come_with_their_panels_are_doubted() -> None:
+    page = np.full((340, 500, 4), 255, np.uint8)
+    for x in (40, 270):
+        page[20:320, x : x + 180, :3] = (180, 200, 210)
+        page[30:310, x + 5 : x + 175, :3] = (120, 40, 40)
+        page[32:308, x + 5 : x + 175 : 2, :3] = (200, 160, 40)
+    assert any("take the panels off" in line for line in split_picture(page).warnings)
