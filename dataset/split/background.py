@@ -168,6 +168,27 @@ def difference(
     return np.asarray(result, dtype=np.uint8)
 
 
+def of_paper(
+    rgba: UInt8[np.ndarray, "height width 4"],
+    picture: UInt8[np.ndarray, "height width 3"],
+    paper: Bool[np.ndarray, "height width"],
+    sure: float,
+) -> Background:
+    """Return the background that a person's page or panel has, of which paper is known.
+
+    Args:
+        rgba: the sheet.
+        picture: what it would show without its figures.
+        paper: pixels on which nothing is drawn.
+        sure: share of its border that is background.
+    """
+    places = _samples(paper)
+    colors = rgba[places][:, :3]
+    plate = Plate(picture, _dominant(colors), "within the picture")
+    judged = _judged("panel", plate, plate.typical, colors, plate.sampled(places))
+    return replace(judged, sure=sure, evidence=plate.evidence)
+
+
 def with_final_tolerance(ground: Background, away: UInt8[np.ndarray, "height width"]) -> Background:
     """Return the background with the tolerance that the whole sheet asks for.
 

@@ -13,9 +13,10 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Int, UInt8
 
-from toonset.dataset.split.background import ring_of
+from toonset.dataset.split.background import Background, difference, of_paper, ring_of
+from toonset.dataset.split.background_field import fit_zone
 from toonset.dataset.split.background_zones import LEAST_ZONE, find_zones, shrunk
-from toonset.raster import dilate, from_nearest
+from toonset.raster import connected_to, dilate, erode, from_nearest, sized_parts
 
 LONGEST_PX = 800  # of the copy in which pages are looked for
 LEAST_PAGE = 0.03  # of the picture
@@ -31,6 +32,12 @@ THING = 0.12  # of the page's height: a drawing is no lower
 ALONE = 0.6  # of the page's height: one such drawing is enough
 AS_TALL = 0.6  # of the tallest drawing on the pages: what stands beside them counts, too
 STRIP = 0.12  # of the same: narrower things beside them are edges and shadows
+STRAIGHT = 0.5  # of each side of a panel: things drawn over its edge hide the rest
+FULL = 0.97  # of a panel: no ground from around it
+FRAMED = 0.3  # of a panel's height: a drawing as high stands on it, two within a frame
+LEAST_PANEL = 0.3  # of the picture
+PLAIN_PANEL = 0.4  # of its inner edge that smooth zones take: no picture
+SMOOTH = 0.95  # of these in the colours of one ground
 UPRIGHT_DEG = 0.5
 UPRIGHT = 0.97  # of the smallest rectangle: less is a perspective
 
@@ -40,22 +47,24 @@ class Pages:
     """The pages of a picture.
 
     Attributes:
-        mask: (height, width) pixels inside of their edges.
-        paper: of these, where nothing is drawn.
+        mask: (height, width) pixels inside of their edges, and what stands over an edge.
+        around: the picture with paper alone, to be shown elsewhere.
         count: how many there are.
         upright: their edges are the picture's rows and columns.
+        ground: the paper, where it is known already.
     """
 
     mask: Bool[np.ndarray, "height width"]
-    paper: Bool[np.ndarray, "height width"]
+    around: UInt8[np.ndarray, "height width 4"]
     count: int
     upright: bool
+    ground: Background | None = None
 
     def extended(
         self, rgba: UInt8[np.ndarray, "height width 4"]
     ) -> UInt8[np.ndarray, "height width 4"]:
-        """Return the picture with the nearest paper in place of what lies around the pages."""
-        return np.where(self.mask[..., None], rgba, from_nearest(rgba, self.paper))
+        """Return the picture with paper in place of what lies around the pages."""
+        return np.where(self.mask[..., None], rgba, self.around)
 
     def __str__(self) -> str:
         """Return where they are, for people."""
@@ -90,12 +99,13 @@ def find_pages(rgba: UInt8[np.ndarray, "height width 4"]) -> Pages | None:
     pages = [page for page in found if page is not None]
     pages = [page for page in pages if not any(_is_in(page, other) for other in pages)]
     if not pages or not _hold_all(pages, outer[labels]):
-        return None
+        return None if clear.any() else _panel(rgba, rgb, labels, outer[labels])
     mask, paper = (
         cv2.resize(np.any(cells, axis=0).view(np.uint8), rgba.shape[1::-1], interpolation=0) > 0
         for cells in ([page.mask for page in pages], [page.paper for page in pages])
     )
-    return Pages(mask, paper, len(pages), all(page.upright for page in pages))
+    around = from_nearest(rgba, paper)
+    return Pages(mask, around, len(pages), all(page.upright for page in pages))
 
 
 def _opaque(rgba: np.ndarray, clear: np.ndarray) -> UInt8[np.ndarray, "rows columns 3"]:
@@ -147,6 +157,80 @@ def _page(own: Bool[np.ndarray, "rows columns"]) -> _Page | None:
         return None
     tilt = abs((angle + 45) % 90 - 45)
     return _Page(mask > 0, own, tallest, tilt <= UPRIGHT_DEG and filled >= UPRIGHT)
+
+
+def _panel(
+    rgba: UInt8[np.ndarray, "height width 4"],
+    rgb: UInt8[np.ndarray, "rows columns 3"],
+    labels: Int[np.ndarray, "rows columns"],
+    ground: Bool[np.ndarray, "rows columns"],
+) -> Pages | None:
+    """Return the panel or frame that the ground around it shows, whatever stands over its edge.
+
+    Most of what is not ground fills an upright rectangle, and most of each of its sides is an edge
+    of that ground. A frame has the ground's colour inside, and several drawings.
+    """
+    ground = connected_to(ring_of(*ground.shape), dilate(ground, CELLS))
+    size_wh = rgba.shape[1::-1]
+    numbers, areas = sized_parts(~ground)
+    if len(areas) < 2:
+        return None
+    own = numbers == 1 + int(areas[1:].argmax())
+    sides = [_side(turned) for turned in (own, own[:, ::-1], own.T, own.T[:, ::-1])]
+    (left, _), (right, _), (top, _), (bottom, _) = sides
+    edge = 2 * CELLS
+    inside = np.zeros_like(own)
+    inside[top + edge : len(own) - bottom - edge, left + edge : own.shape[1] - right - edge] = True
+    straight = min(share for _, share in sides) >= STRAIGHT
+    if not straight or inside.sum() < LEAST_PANEL * own.size or own[inside].mean() < FULL:
+        return None
+    paper = _paper_of(rgba, rgb, labels, inside)
+    if paper is None:
+        return None
+    shown = cv2.resize(paper.colors((0, 0, *size_wh)), rgb.shape[1::-1])
+    drawn = inside & (difference(rgb, shown) > SAME_PAPER)
+    heights = _heights(drawn, np.zeros_like(drawn))
+    is_frame = np.abs(np.median(rgb[ground], axis=0) - paper.rgb).max() < APART
+    tall = FRAMED * np.count_nonzero(inside.any(axis=1))
+    if (heights >= tall).sum() < (2 if is_frame else 1):
+        return None
+    beyond = dilate(own, CELLS) & ~dilate(inside, edge + CELLS)
+    cells = inside | (dilate(beyond, edge + CELLS) & own)
+    mask = cv2.resize(cells.view(np.uint8), size_wh, interpolation=cv2.INTER_NEAREST) > 0
+    shown = paper.colors((0, 0, *size_wh))
+    return Pages(mask, np.dstack([shown, np.full_like(shown[..., :1], 255)]), 1, True, paper)
+
+
+def _paper_of(
+    rgba: UInt8[np.ndarray, "height width 4"],
+    small: UInt8[np.ndarray, "rows columns 3"],
+    labels: Int[np.ndarray, "rows columns"],
+    inside: Bool[np.ndarray, "rows columns"],
+) -> Background | None:
+    """Return the smooth ground that zones along a panel's edge show; None if it is a picture."""
+    rim = inside & ~erode(inside, CELLS)
+    counts = np.bincount(labels[rim], minlength=int(labels.max()) + 1)
+    own = counts >= LEAST_ZONE * rim.sum()
+    own[0] = False
+    cells = own[labels] & inside
+    if counts[own].sum() < PLAIN_PANEL * rim.sum():
+        return None
+    colors = fit_zone(small, cells).colors((0, 0, *small.shape[1::-1]))
+    if (difference(small, colors)[cells] <= APART).mean() < SMOOTH:
+        return None
+    size_wh = rgba.shape[1::-1]
+    plate = cv2.resize(colors, size_wh, interpolation=cv2.INTER_LINEAR)
+    paper = cv2.resize(erode(cells).view(np.uint8), size_wh, interpolation=cv2.INTER_NEAREST) > 0
+    return of_paper(rgba, plate, paper, float(counts[own].sum() / rim.sum()))
+
+
+def _side(own: Bool[np.ndarray, "rows columns"]) -> tuple[int, float]:
+    """Return the column where most rows of a patch begin, and the share of its rows that do."""
+    rows = own[own.any(axis=1)]
+    first = rows.argmax(axis=1)
+    counts = np.bincount(first, minlength=3)
+    near = np.convolve(counts, np.ones(3, int), "same")  # an edge is drawn by hand
+    return int(near.argmax()), float(near.max() / len(rows))
 
 
 def _heights(

@@ -180,8 +180,10 @@ def split_picture(
         rgba = flatten(rgba)
     else:
         rgba, residual = remove_residual_alpha(rgba)
-    ground = find_background(rgba, options.background_rgb)
-    mark = find_watermark(rgba[..., :3], ground.rgb) if ground.kind == "plain" else None
+    of_page = None if pages is None else pages.ground
+    ground = of_page or find_background(rgba, options.background_rgb)
+    plain = ground.kind == "plain" and of_page is None
+    mark = find_watermark(rgba[..., :3], ground.rgb) if plain else None
     if mark is not None:
         rgba = remove_watermark(rgba, mark)
         ground = find_background(rgba, options.background_rgb)

@@ -6,14 +6,14 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.dataset.split.background import SURE_ENOUGH, Background
-from toonset.dataset.split.figures.blobs import RECTANGLE, Blobs, shared_colors
+from toonset.dataset.split.figures.blobs import RECTANGLE, Blobs, find_blobs, shared_colors
 from toonset.dataset.split.figures.grouping import LEAST_PART
 from toonset.dataset.split.figures.open_outlines import LINE, Gap
 from toonset.dataset.split.figures.rows import LOWEST
 from toonset.dataset.split.pages import Pages
 from toonset.dataset.split.segment import SheetLayout, figure_cells
 from toonset.dataset.split.watermark import Watermark
-from toonset.raster import sized_parts, wider_than
+from toonset.raster import dilate, sized_parts, wider_than
 from toonset.view import View
 
 NEARLY_A_VIEW = 0.5  # of the views' height: something left out that may be a small one
@@ -26,7 +26,13 @@ WHOLE = 0.6  # of the sheet that one view's box covers though there is text besi
 WIDE_GAP = 0.05  # of the figure's height: a wider gap may be meant
 LARGE_POCKET = 0.01  # of the figure's squared height: so much more or less changes it
 MOST_STROKES = 0.08  # of a view: with more it is hollow somewhere
-WIDE = 1.25  # times the next widest: two figures, or a figure and a study, that touch
+STROKES = ("mark", "speck", "text")  # as which pieces of a pencil drawing are left out
+BROKEN = 0.05  # of the views' height: gaps between its pieces
+PIECES = 3  # no sword or ruler has more
+SLENDER = 0.12  # of its height: a drawing is no narrower
+WIDE = (
+    1.28  # times the next widest of four or more: two figures, or a figure and a study, that touch
+)
 
 
 def page_warnings(pages: Pages | None) -> tuple[str, ...]:
@@ -69,6 +75,7 @@ def figure_warnings(
         *_near_parts(found, views),
         *_other_groups(found),
         *_like_views(found, views, rgba),
+        *_scattered_strokes(found, views),
     )
 
 
@@ -126,11 +133,10 @@ def _strokes(view: View) -> tuple[int, int] | None:
 
 def _wide_views(views: list[View]) -> list[str]:
     said = []
-    widths = [view.figure_box[2] for view in views]
-    next_widest = sorted(widths)[-2] if len(views) >= 3 else np.inf
+    widths = [view.figure_box[2] / view.figure_box[3] for view in views]
+    most = WIDE * sorted(widths)[-2] if len(views) > 3 else BROAD
     for view, width in zip(views, widths, strict=True):
-        among_others = width > WIDE * next_widest
-        if among_others or width > BROAD * view.figure_box[3]:
+        if width > min(most, BROAD):
             said.append(f"view {view.name} is unusually wide: do two figures touch?")
     return said
 
@@ -236,6 +242,28 @@ def _like_views(found: SheetLayout, views: list[View], rgba: np.ndarray) -> list
             said.append(
                 f"a drawing at {x}, {y} of {100 * height / usual:.0f} % of the views' height "
                 "was left out: if it is a view, give all views with --boxes"
+            )
+    return said
+
+
+def _scattered_strokes(found: SheetLayout, views: list[View]) -> list[str]:
+    """Return a line for strokes left out that lie together as high as a view: a pencil drawing."""
+    kinds = np.array([*found.grouping.kinds, ""], dtype=object)
+    usual = float(np.median([view.figure_box[3] for view in views])) / found.cell_px
+    reach = max(1, round(BROKEN / 2 * usual))
+    strokes = np.isin(kinds, STROKES)[found.blobs.labels - 1]
+    together = find_blobs(dilate(strokes, reach))
+    said = []
+    for number, (x, y, width, height) in enumerate(together.boxes.tolist()):
+        tall, pieces = (
+            height - 2 * reach,
+            len(np.unique(found.blobs.labels[together.labels == number + 1])),
+        )
+        if tall >= LOWEST * usual and width - 2 * reach >= SLENDER * tall and pieces > PIECES:
+            x, y = ((v + reach) * found.cell_px for v in (x, y))
+            said.append(
+                f"strokes at {x}, {y} lie together {100 * tall / usual:.0f} % as high as the "
+                "views: if they are a drawing, close its outline"
             )
     return said
 

@@ -305,3 +305,37 @@ def test_a_drawn_frame_on_a_gradient_is_no_step() -> None:
     sheet = np.broadcast_to(shade, (500, 700, 3)).astype(np.uint8)
     cv2.rectangle(sheet, (6, 6), (693, 493), BLACK, 7)
     assert fit_steps(sheet, ring_of(500, 700)) is None
+
+
+def test_a_panel_over_whose_edge_figures_stand() -> None:
+    slope = np.linspace(0, 1, WIDTH)[None, :, None]
+    shades = np.array((232, 240, 255)) * (1 - slope) + np.array((190, 215, 250)) * slope
+    picture, mask = figures(np.tile(shades, (HEIGHT, 1, 1)).astype(np.uint8))
+    rgba = np.full((HEIGHT + 60, WIDTH + 80, 4), 255, np.uint8)
+    rgba[10 : HEIGHT + 10, 40 : WIDTH + 40, :3] = picture
+    below = slice(225, HEIGHT + 10)  # the panel ends above the feet
+    outside = ~np.pad(mask, ((10, 50), (40, 40)))[below]
+    rgba[below][outside] = 255
+    found = assert_right(rgba, np.pad(mask, ((10, 50), (40, 40))))
+    assert any("what lies around one page" in remark for remark in found.remarks)
+
+
+def test_a_frame_over_whose_edge_figures_stand() -> None:
+    picture, mask = figures(plain(255))
+    rgba = np.full((HEIGHT + 60, WIDTH + 80, 4), 255, np.uint8)
+    truth = np.pad(mask, ((30, 30), (40, 40)))
+    cv2.rectangle(rgba, (20, 12), (WIDTH + 60, 265), (60, 60, 60, 255), 4)
+    rgba[truth] = opaque(picture)[mask]
+    assert_right(rgba, truth)
+
+
+def test_a_boxy_figure_is_no_panel() -> None:
+    rgba = opaque(plain(255, 300, 320))
+    cv2.rectangle(rgba, (40, 30), (260, 270), (40, 90, 160, 255), -1)
+    cv2.circle(rgba, (110, 100), 11, (255, 255, 255, 255), -1)
+    cv2.circle(rgba, (190, 100), 11, (255, 255, 255, 255), -1)
+    for x in (90, 180):
+        cv2.rectangle(rgba, (x, 270), (x + 30, 300), (20, 20, 20, 255), -1)
+    (view,) = split_picture(rgba).views
+    assert view.figure_box == (40, 30, 221, 271)
+    assert view.mask[20, 20]
