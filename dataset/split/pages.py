@@ -34,7 +34,7 @@ AS_TALL = 0.6  # of the tallest drawing on the pages: what stands beside them co
 STRIP = 0.12  # of the same: narrower things beside them are edges and shadows
 STRAIGHT = 0.5  # of each side of a panel: things drawn over its edge hide the rest
 FULL = 0.97  # of a panel: no ground from around it
-FRAMED = 0.3  # of a panel's height: a drawing as high stands on it, two within a frame
+FRAMED = 0.3  # of a panel's height: a drawing as high stands on it
 LEAST_PANEL = 0.3  # of the picture
 PLAIN_PANEL = 0.4  # of its inner edge that smooth zones take: no picture
 SMOOTH = 0.95  # of these in the colours of one ground
@@ -165,10 +165,10 @@ def _panel(
     labels: Int[np.ndarray, "rows columns"],
     ground: Bool[np.ndarray, "rows columns"],
 ) -> Pages | None:
-    """Return the panel or frame that the ground around it shows, whatever stands over its edge.
+    """Return the panel that the ground around it shows, whatever stands over its edge.
 
     Most of what is not ground fills an upright rectangle, and most of each of its sides is an edge
-    of that ground. A frame has the ground's colour inside, and several drawings.
+    of that ground.
     """
     ground = connected_to(ring_of(*ground.shape), dilate(ground, CELLS))
     size_wh = rgba.shape[1::-1]
@@ -187,12 +187,12 @@ def _panel(
     paper = _paper_of(rgba, rgb, labels, inside)
     if paper is None:
         return None
+    if np.abs(np.median(rgb[ground], axis=0) - paper.rgb).max() < APART:
+        return None
     shown = cv2.resize(paper.colors((0, 0, *size_wh)), rgb.shape[1::-1])
     drawn = inside & (difference(rgb, shown) > SAME_PAPER)
     heights = _heights(drawn, np.zeros_like(drawn))
-    is_frame = np.abs(np.median(rgb[ground], axis=0) - paper.rgb).max() < APART
-    tall = FRAMED * np.count_nonzero(inside.any(axis=1))
-    if (heights >= tall).sum() < (2 if is_frame else 1):
+    if heights.max(initial=0) < FRAMED * np.count_nonzero(inside.any(axis=1)):
         return None
     beyond = dilate(own, CELLS) & ~dilate(inside, edge + CELLS)
     cells = inside | (dilate(beyond, edge + CELLS) & own)

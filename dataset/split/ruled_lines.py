@@ -28,6 +28,11 @@ OPEN_ACROSS = 0.2  # the same of a line that crosses the sheet, behind all figur
 DASHES = 6  # flat pieces in a row: a dashed line
 EQUAL = 0.25  # of their length: dashes differ by less
 MOSTLY = 0.6  # of the dashes; figures cut some short
+HAIR = 8  # part of the thickest line: so thin are the pieces of faint lines
+LEVEL = 0.0008  # of the sheet's width: they lie on one level
+CRUMBS = 10  # pieces of a faint line
+FAINT = 0.02  # of the sheet's width that they cover
+STANDING_OUT = 4  # times what rows have of them on the average: else they are a pencil's grain
 LONGEST_DASH = 0.1  # of the sheet's side
 JOINT = 0.02  # of the shorter side: corners may miss each other by so much
 THROUGHOUT = 0.75  # of the columns with paper above and below that a broken line crosses
@@ -150,8 +155,19 @@ def _dashed(paint: np.ndarray, thickest: int, *, vertical: bool) -> list[Line]:
     thin = (height <= max(3, thickest // 2)) & (width >= 2 * height)
     flat = thin & (width <= LONGEST_DASH * paint.shape[1])
     lines: list[Line] = []
+    hair = flat & (height <= max(2, thickest // HAIR))
+    slack = max(1, round(LEVEL * paint.shape[1]))
+    each = np.bincount(top[hair], width[hair], len(paint))
+    covered = np.convolve(each, np.ones(2 * slack + 1), "same")
+    least = max(FAINT * paint.shape[1], STANDING_OUT * float(np.mean(covered)))
     for level in np.unique(top[flat]):
         own = flat & (np.abs(top - level) <= 1)
+        faint = hair & (np.abs(top - level) <= slack)
+        if covered[level] >= least and _spans(left[faint], paint.shape[1]):
+            last = int((top + height)[faint].max()) - 1
+            if not lines or lines[-1].last < level - slack:
+                lines.append(Line(int(level), last, 0, paint.shape[1], vertical))
+            continue
         start, stop = int(left[own].min()), int((left + width)[own].max())
         if own.sum() < DASHES or stop - start < CROSSING * paint.shape[1]:
             continue
@@ -162,6 +178,11 @@ def _dashed(paint: np.ndarray, thickest: int, *, vertical: bool) -> list[Line]:
         if not lines or lines[-1].last < level - 1:
             lines.append(Line(int(level), last, 0, paint.shape[1], vertical))
     return lines
+
+
+def _spans(left: np.ndarray, side: int) -> bool:
+    """Return whether hair-thin pieces are spread as what a scan leaves of a line across a sheet."""
+    return len(left) >= CRUMBS and len(np.unique(10 * left // side)) >= 10 * CROSSING
 
 
 def _stacked(runs: list[tuple[int, int, int]]) -> list[tuple[int, int, int, int]]:

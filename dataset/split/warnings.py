@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.dataset.split.background import SURE_ENOUGH, Background
-from toonset.dataset.split.figures.blobs import RECTANGLE, Blobs, find_blobs, shared_colors
+from toonset.dataset.split.figures.blobs import Blobs, find_blobs, shared_colors
 from toonset.dataset.split.figures.grouping import LEAST_PART
 from toonset.dataset.split.figures.open_outlines import LINE, Gap
 from toonset.dataset.split.figures.rows import LOWEST
@@ -25,14 +25,13 @@ AS_LIKELY = 0.6  # of the merit of the group that was taken: another may be the 
 WHOLE = 0.6  # of the sheet that one view's box covers though there is text beside it
 WIDE_GAP = 0.05  # of the figure's height: a wider gap may be meant
 LARGE_POCKET = 0.01  # of the figure's squared height: so much more or less changes it
+FULL = 0.82  # of its box: no figure fills more
 MOST_STROKES = 0.08  # of a view: with more it is hollow somewhere
 STROKES = ("mark", "speck", "text")  # as which pieces of a pencil drawing are left out
 BROKEN = 0.05  # of the views' height: gaps between its pieces
 PIECES = 3  # no sword or ruler has more
 SLENDER = 0.12  # of its height: a drawing is no narrower
-WIDE = (
-    1.28  # times the next widest of four or more: two figures, or a figure and a study, that touch
-)
+WIDE = 1.28  # times the next widest of four or more: two figures, or a study that touches
 
 
 def page_warnings(pages: Pages | None) -> tuple[str, ...]:
@@ -154,13 +153,11 @@ def _whole_page(found: SheetLayout, views: list[View], rgba: np.ndarray) -> list
 
 
 def _panels(views: list[View]) -> list[str]:
-    """Return a line if all views are rectangles: the panels in which the figures stand."""
+    """Return a line if views fill their boxes as panels do in which figures stand."""
     fill = [view.mask.sum() / (view.figure_box[2] * view.figure_box[3]) for view in views]
-    if min(fill) < RECTANGLE:
+    if np.median(fill) <= FULL:
         return []
-    return [
-        "every view fills its whole rectangle: if the figures stand on panels, take the panels off"
-    ]
+    return ["the views are nearly rectangles: if the figures stand on panels, take the panels off"]
 
 
 def _near_parts(found: SheetLayout, views: list[View]) -> list[str]:

@@ -61,10 +61,11 @@ def find_strokes(blobs: Blobs, painted: Mask) -> Mask:
     strokes = [number for number in _large(blobs) if _is_one_line(blobs.mask(number))]
     if not strokes:
         return found
-    height = max(int(blobs.boxes[number, 3]) for number in range(len(blobs.areas)))
+    height = int(blobs.boxes[:, 3].max())
     broad = wider_than(painted, max(1, round(LINE * height)))
-    lines = sum(int(blobs.areas[number]) for number in strokes)
-    if np.count_nonzero(broad) <= PAINTED * (int(blobs.areas.sum()) - lines):
+    lines = int(blobs.areas[strokes].sum())
+    others = int(blobs.areas.sum()) - lines
+    if others < lines or np.count_nonzero(broad) < PAINTED * others:
         return found
     for number in strokes:
         found[blobs.window(number)] |= blobs.mask(number)

@@ -320,15 +320,6 @@ def test_a_panel_over_whose_edge_figures_stand() -> None:
     assert any("what lies around one page" in remark for remark in found.remarks)
 
 
-def test_a_frame_over_whose_edge_figures_stand() -> None:
-    picture, mask = figures(plain(255))
-    rgba = np.full((HEIGHT + 60, WIDTH + 80, 4), 255, np.uint8)
-    truth = np.pad(mask, ((30, 30), (40, 40)))
-    cv2.rectangle(rgba, (20, 12), (WIDTH + 60, 265), (60, 60, 60, 255), 4)
-    rgba[truth] = opaque(picture)[mask]
-    assert_right(rgba, truth)
-
-
 def test_a_boxy_figure_is_no_panel() -> None:
     rgba = opaque(plain(255, 300, 320))
     cv2.rectangle(rgba, (40, 30), (260, 270), (40, 90, 160, 255), -1)

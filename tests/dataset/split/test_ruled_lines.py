@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 
 from toonset.dataset.split.ruled_lines import find_lines
+from toonset.dataset.split.sheet import split_picture
 
 
 def sheet(levels: tuple[int, ...]) -> np.ndarray:
@@ -30,3 +32,20 @@ def test_a_height_line_behind_shirts_of_the_papers_colour_is_one_of_its_fellows(
 
 def test_without_fellows_pieces_on_one_level_are_no_line() -> None:
     assert not [line for line in find_lines(sheet((110,))) if not line.vertical]
+
+
+def test_crumbs_of_faint_guide_lines_join_no_figures() -> None:
+    picture = np.full((500, 900, 3), 255, np.uint8)
+    for x in (200, 450, 700):
+        cv2.ellipse(picture, (x, 250), (60, 180), 0, 0, 360, (120, 120, 120), 2)
+        cv2.ellipse(picture, (x, 250), (30, 60), 0, 0, 360, (120, 120, 120), 2)
+    bare = split_picture(np.dstack([picture, np.full(picture.shape[:2], 255, np.uint8)]))
+    rng = np.random.default_rng(0)
+    for y in range(60, 450, 45):
+        for x in rng.integers(20, 870, 40):  # what a scan leaves of a ruled line
+            picture[y + rng.integers(2), x : x + rng.integers(2, 12)] = 200
+    found = split_picture(np.dstack([picture, np.full(picture.shape[:2], 255, np.uint8)]))
+    assert len(found.views) == 3
+    for a, b in zip(found.views, bare.views, strict=True):
+        assert np.abs(np.subtract(a.figure_box, b.figure_box)).max() <= 3
+    assert sum(left.kind == "frame" for left in found.left_out) >= 8
