@@ -19,6 +19,7 @@ from toonset.cli.common.cutting import (
     DropOption,
     GridOption,
     GroupOption,
+    MattingOption,
     OutfitOption,
 )
 from toonset.cli.common.output import (
@@ -139,6 +140,7 @@ def calibrate(
     drop: DropOption = "",
     group: GroupOption = None,
     outfit: OutfitOption = "",
+    matting: MattingOption = None,
     corrections: CorrectionsOption = None,
     out: Annotated[
         Path, typer.Option("-o", "--out", help="Bundle folder.", rich_help_panel=OUTPUT_PANEL)
@@ -168,12 +170,14 @@ def calibrate(
     hints.check()
     if front is not None and (labels or landmarks_only):
         raise UsageError("--front does nothing beside --views or --landmarks-only; drop one")
-    Cutting(boxes, grid, background, drop, group, outfit).check()
+    Cutting(boxes, grid, background, drop, group, outfit, matting).check()
     printer = Printer(as_json, quiet, verbose)
     _check_files(sheets, hints, boxes, front=front is not None)
     given = None if str(mesh) == NO_BODY else mesh
     body = _body(mesh, up)
-    check_output(out, [*sheets, given, landmarks, init, boxes, corrections], WRITTEN, force=force)
+    check_output(
+        out, [*sheets, given, landmarks, init, boxes, matting, corrections], WRITTEN, force=force
+    )
     sheet = split_sheet(
         sheets,
         boxes=boxes,
@@ -184,6 +188,7 @@ def calibrate(
         corrections=corrections,
         group=group,
         outfit=outfit,
+        matting=matting,
     )
     if front is not None:
         hints = replace(hints, labels=front_label(front, len(sheet.views)))

@@ -16,6 +16,7 @@ from toonset.cli.common.cutting import (
     DropOption,
     GridOption,
     GroupOption,
+    MattingOption,
     OutfitOption,
 )
 from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag
@@ -42,6 +43,7 @@ def split(
     drop: DropOption = "",
     group: GroupOption = None,
     outfit: OutfitOption = "",
+    matting: MattingOption = None,
     labels: Annotated[
         str,
         typer.Option(
@@ -68,11 +70,12 @@ def split(
     from toonset.errors import PictureError, SheetError
     from toonset.read import check_there
 
-    Cutting(boxes, grid, background, drop, group, outfit).check()
+    Cutting(boxes, grid, background, drop, group, outfit, matting).check()
     printer = Printer(as_json, quiet)
     check_there(sheets, "picture", PictureError)
     check_there([boxes], "boxes", SheetError)
-    check_output(out, [*sheets, boxes], WRITTEN, force=force)
+    check_there([matting], "matting network", PictureError)
+    check_output(out, [*sheets, boxes, matting], WRITTEN, force=force)
     sheet = split_sheet(
         sheets,
         boxes=boxes,
@@ -82,6 +85,7 @@ def split(
         labels=labels,
         group=group,
         outfit=outfit,
+        matting=matting,
     )
     write_split(out, sheet.split, draw_sheet(sheet), sheet.options, force=force)
     _say(sheet, out, printer)

@@ -62,6 +62,15 @@ OutfitOption = Annotated[
         rich_help_panel=CORRECTIONS_PANEL,
     ),
 ]
+MattingOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--matting",
+        metavar="FILE",
+        help="A network that takes figures off backdrops: u2net.onnx or another one of rembg's.",
+        rich_help_panel=CORRECTIONS_PANEL,
+    ),
+]
 CorrectionsOption = Annotated[
     Path | None,
     typer.Option(

@@ -117,8 +117,8 @@ def find_background(
     if found.sure < LEAST_SURE:
         raise SheetError(
             f"the background is not one colour (the commonest takes {found.sure:.0%} of the "
-            "border); put the figures on a plain or a transparent background, or name its colour "
-            "with --background '#rrggbb'"
+            "border); put the figures on a plain or a transparent background, name its colour "
+            "with --background '#rrggbb', or take them off with --matting"
         )
     return found
 

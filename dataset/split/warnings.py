@@ -157,7 +157,7 @@ def _panels(views: list[View]) -> list[str]:
     fill = [view.mask.sum() / (view.figure_box[2] * view.figure_box[3]) for view in views]
     if np.median(fill) <= FULL:
         return []
-    return ["the views are nearly rectangles: if the figures stand on panels, take the panels off"]
+    return ["the views are nearly rectangles: if the figures stand on panels, take them off with --matting"]
 
 
 def _near_parts(found: SheetLayout, views: list[View]) -> list[str]:
@@ -256,7 +256,11 @@ def _scattered_strokes(found: SheetLayout, views: list[View]) -> list[str]:
             height - 2 * reach,
             len(np.unique(found.blobs.labels[together.labels == number + 1])),
         )
-        if tall >= LOWEST * usual and width - 2 * reach >= SLENDER * tall and pieces > PIECES:
+        if (
+            tall >= NEARLY_A_VIEW * usual
+            and width - 2 * reach >= SLENDER * tall
+            and pieces > PIECES
+        ):
             x, y = ((v + reach) * found.cell_px for v in (x, y))
             said.append(
                 f"strokes at {x}, {y} lie together {100 * tall / usual:.0f} % as high as the "

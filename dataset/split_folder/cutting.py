@@ -25,6 +25,7 @@ class Cutting:
         drop: numbers of views to leave out, "3,5" or "3-5".
         group: number of the group of figures, from 1; None: the likeliest turnaround.
         outfit: letter of a row of the group, "A" is the uppermost; "": all rows.
+        matting: ONNX file of a network that takes the figures off their background.
     """
 
     boxes: Path | None = None
@@ -33,6 +34,7 @@ class Cutting:
     drop: str = ""
     group: int | None = None
     outfit: str = ""
+    matting: Path | None = None
 
     def check(self) -> None:
         """Refuse what contradicts itself or cannot be understood, before any file is read.
@@ -47,6 +49,8 @@ class Cutting:
         for name, value in (("--group", self.group), ("--outfit", self.outfit)):
             if value and by_hand:
                 raise UsageError(f"{by_hand} and {name} both say which figures count; drop one")
+        if self.matting is not None and self.background:
+            raise UsageError("--matting and --background both say what is no figure; drop one")
         _ = self.dropped, self.background_rgb, self.cells, self.taken
 
     @property
@@ -105,6 +109,7 @@ class Cutting:
             "--grid": self.grid,
             "--group": self.group,
             "--outfit": self.outfit,
+            "--matting": self.matting,
         }
         return tuple(name for name, value in named.items() if value)
 
@@ -117,6 +122,7 @@ class Cutting:
             "grid": self.grid,
             "group": self.group or "",
             "outfit": self.outfit.strip().upper(),
+            "matting": self.matting.name if self.matting else "",
         }
         return {name: value for name, value in named.items() if value}
 

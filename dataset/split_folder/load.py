@@ -17,6 +17,7 @@ from jaxtyping import UInt8
 from toonset.dataset.images import photoshop
 from toonset.dataset.images.folder import picture_files
 from toonset.dataset.images.layers import layers_line
+from toonset.dataset.images.matting_network import MattingNetwork, read_network, without_background
 from toonset.dataset.images.picture import decode_rgba
 from toonset.dataset.split.captions import with_captions
 from toonset.dataset.split.sheet import SheetOptions, split_picture
@@ -91,6 +92,7 @@ def split_sheet(
     corrections: str | Path | None = None,
     group: int | None = None,
     outfit: str = "",
+    matting: str | Path | None = None,
 ) -> Sheet:
     """Return the drawings of a character sheet, cut out with alpha.
 
@@ -106,6 +108,8 @@ def split_sheet(
         group: number of the group of equal figures, from 1, as split.json lists them; None: the
             likeliest turnaround.
         outfit: letter of a row of the group, "A" is the uppermost; "": all rows.
+        matting: ONNX file of a network that takes the figures off their background: U2-Net and
+            others that rembg can use.
 
     Raises:
         ToonsetError: a file is not a picture or shows no figure, is given twice, a split folder is
@@ -114,7 +118,8 @@ def split_sheet(
     paths = [sheet] if isinstance(sheet, str | Path) else sheet
     if not paths:
         raise UsageError("split_sheet: no sheet; give a picture, several, or a folder")
-    cutting = Cutting(None if boxes is None else Path(boxes), grid, background, drop, group, outfit)
+    files = [None if file is None else Path(file) for file in (boxes, matting)]
+    cutting = Cutting(files[0], grid, background, drop, group, outfit, files[1])
     cutting.check()
     given = None if corrections is None else Given.of(corrections)
     if given is not None:
@@ -138,13 +143,15 @@ def _load(paths: Sequence[Path], cutting: Cutting, given: Given | None) -> Sheet
     if given is not None:
         cut = _as_corrected(places, cut, given)
         where = f"{given.path}: boxes" if given.content.boxes else where
+    network = None if cutting.matting is None else read_network(cutting.matting)
     parts = [
-        _of_split_folder(place) if options is None else _of_sheet(place, options, where)
+        _of_split_folder(place) if options is None else _of_sheet(place, options, where, network)
         for place, options in zip(places, cut, strict=True)
     ]
     whole = replace(_joined(parts), skipped=tuple(skipped))
-    if cutting.boxes is not None:
-        whole = replace(whole, files=(*whole.files, InputFile.of("boxes", cutting.boxes)))
+    for role, file in (("boxes", cutting.boxes), ("matting", cutting.matting)):
+        if file is not None:
+            whole = replace(whole, files=(*whole.files, InputFile.of(role, file)))
     if given is not None:
         split, notes = given.applied(whole.split)
         files = (*whole.files, InputFile.of("corrections", given.path))
@@ -245,9 +252,13 @@ def _of_split_folder(folder: Path) -> Sheet:
     return Sheet(split, len(split.views), (None,) * len(split.sources), files, notes=notes)
 
 
-def _of_sheet(path: Path, options: SheetOptions, where: str) -> Sheet:
+def _of_sheet(
+    path: Path, options: SheetOptions, where: str, network: MattingNetwork | None
+) -> Sheet:
     data = read_whole(path, "picture", PictureError)
     picture = decode_rgba(data, path)
+    if network is not None:
+        picture = without_background(picture, network)
     height, width = picture.shape[:2]
     check_boxes(options.boxes, (width, height), where)
     try:

@@ -65,4 +65,4 @@ def test_figures_that_come_with_their_panels_are_doubted() -> None:
         page[20:320, x : x + 180, :3] = (180, 200, 210)
         page[30:310, x + 5 : x + 175, :3] = (120, 40, 40)
         page[32:308, x + 5 : x + 175 : 2, :3] = (200, 160, 40)
-    assert any("take the panels off" in line for line in split_picture(page).warnings)
+    assert any("--matting" in line for line in split_picture(page).warnings)
