@@ -19,6 +19,8 @@ LEAST_SHEET = 100  # cells on the shorter side: on a smaller picture a line is p
 THICKEST = 0.015  # of the sheet's shorter side
 THICKEST_PX = 6  # whatever the sheet's size
 CROSSING = 0.6  # of the sheet's width: a line this long needs no others
+SHARED = 0.3  # of its width: shorter, if several begin and end with it
+EQUALS = 4  # such lines
 UPRIGHT = 0.9  # of its height: the same; staffs and poles are shorter
 LEAST_SIDE = 0.2  # of the sheet's shorter side: a smaller rectangle is part of a drawing
 ALIKE = 0.8  # overlap of the runs of neighbouring rows
@@ -80,7 +82,7 @@ def find_lines(paint: Bool[np.ndarray, "height width"]) -> list[Line]:
         turned = np.ascontiguousarray(paint.T) if vertical else paint
         lines += _straight(turned, thickest, vertical=vertical)
         lines += _dashed(turned, thickest, vertical=vertical)
-    free = [line for line in lines if _crosses(line, paint.shape)]
+    free = [line for line in lines if _crosses(line, paint.shape) or _has_equals(line, lines)]
     closed = _closed(lines, free, JOINT * min(height, width) + thickest)
     shortest = LEAST_SIDE * min(height, width)
     return free + [
@@ -130,7 +132,7 @@ def _broken(paint: np.ndarray, lines: list[Line]) -> list[Line]:
     for first in sorted({line.first for line in lines}):
         own = [line for line in lines if line.first == first]
         length = sum(line.stop - line.start for line in own)
-        least = UPRIGHT if own[0].vertical else CROSSING
+        least = UPRIGHT if own[0].vertical else SHARED
         if len(own) > 1 and length >= least * paint.shape[1]:
             start, stop = min(line.start for line in own), max(line.stop for line in own)
             last = max(line.last for line in own)
@@ -210,7 +212,7 @@ def _is_open(paint: np.ndarray, line: Line) -> bool:
     below = paint[line.last + 2 : line.last + 2 + reach, columns]
     closed_above = above.all(axis=0) & bool(len(above))
     closed_below = below.all(axis=0) & bool(len(below))
-    across = not line.vertical and line.stop - line.start >= CROSSING * paint.shape[1]
+    across = not line.vertical and line.stop - line.start >= SHARED * paint.shape[1]
     least = OPEN_ACROSS if across else OPEN_UPRIGHT if line.vertical else OPEN
     return bool(np.mean(~closed_above & ~closed_below) >= least)
 
@@ -227,6 +229,17 @@ def _beside(paint: np.ndarray, line: Line) -> tuple[np.ndarray, np.ndarray]:
 def _crosses(line: Line, shape: tuple[int, ...]) -> bool:
     length = line.stop - line.start
     return length >= (UPRIGHT * shape[0] if line.vertical else CROSSING * shape[1])
+
+
+def _has_equals(line: Line, lines: list[Line]) -> bool:
+    """Return whether level lines of a good length begin and end together, as height lines do."""
+    ends = [
+        other.first
+        for other in lines
+        if not (line.vertical or other.vertical)
+        and max(abs(other.start - line.start), abs(other.stop - line.stop)) <= BROKEN_PX
+    ]
+    return len(set(ends)) >= EQUALS
 
 
 def _closed(lines: list[Line], free: list[Line], slack: float) -> list[Line]:

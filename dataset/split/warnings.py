@@ -157,7 +157,10 @@ def _panels(views: list[View]) -> list[str]:
     fill = [view.mask.sum() / (view.figure_box[2] * view.figure_box[3]) for view in views]
     if np.median(fill) <= FULL:
         return []
-    return ["the views are nearly rectangles: if the figures stand on panels, take them off with --matting"]
+    return [
+        "the views are nearly rectangles: if the figures stand on panels, take them off with "
+        "--matting"
+    ]
 
 
 def _near_parts(found: SheetLayout, views: list[View]) -> list[str]:

@@ -49,3 +49,15 @@ def test_crumbs_of_faint_guide_lines_join_no_figures() -> None:
     for a, b in zip(found.views, bare.views, strict=True):
         assert np.abs(np.subtract(a.figure_box, b.figure_box)).max() <= 3
     assert sum(left.kind == "frame" for left in found.left_out) >= 8
+
+
+def test_height_lines_that_end_together_are_ruled_though_they_are_short() -> None:
+    picture = np.full((400, 1000, 3), 255, np.uint8)
+    for x in (100, 220, 340):
+        cv2.ellipse(picture, (x, 200), (45, 150), 0, 0, 360, (180, 60, 40), -1)
+    bare = split_picture(np.dstack([picture, np.full(picture.shape[:2], 255, np.uint8)]))
+    for y in range(45, 360, 62):
+        picture[y, 30:430][(picture[y, 30:430] == 255).all(axis=1)] = 170
+    found = split_picture(np.dstack([picture, np.full(picture.shape[:2], 255, np.uint8)]))
+    assert [view.figure_box for view in found.views] == [view.figure_box for view in bare.views]
+    assert "ruled lines and frames were taken for paper (6)" in found.remarks

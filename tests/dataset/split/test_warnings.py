@@ -66,3 +66,17 @@ def test_figures_that_come_with_their_panels_are_doubted() -> None:
         page[30:310, x + 5 : x + 175, :3] = (120, 40, 40)
         page[32:308, x + 5 : x + 175 : 2, :3] = (200, 160, 40)
     assert any("--matting" in line for line in split_picture(page).warnings)
+
+
+def test_pieces_of_a_pencil_drawing_that_were_left_out_are_doubted() -> None:
+    page = sheet_of(*[figure(280, (200, 40, 40)) for _ in range(3)], figure(280, (255, 255, 255)))
+    x = page.shape[1] - 120
+    page[30:330, x - 60 :, :3] = 255
+    for k, y in enumerate(range(50, 310, 34)):  # a fourth one: broken strokes, slanting
+        for side in (0, 50):
+            start, stop = (x + side + 9 * (k % 3), y), (x + side + 9 * ((k + 1) % 3), y + 25)
+            cv2.line(page, start, stop, (90, 90, 90, 255), 2)
+    cv2.line(page, (x + 9, 60), (x + 50, 66), (90, 90, 90, 255), 2)
+    sheet = split_picture(page)
+    assert len(sheet.views) == 3
+    assert any("strokes at" in line for line in sheet.warnings)
