@@ -174,7 +174,7 @@ def of_paper(
     paper: Bool[np.ndarray, "height width"],
     sure: float,
 ) -> Background:
-    """Return the background that a person's page or panel has, of which paper is known.
+    """Return the background of a panel of which some paper is known.
 
     Args:
         rgba: the sheet.

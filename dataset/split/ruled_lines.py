@@ -82,7 +82,11 @@ def find_lines(paint: Bool[np.ndarray, "height width"]) -> list[Line]:
         turned = np.ascontiguousarray(paint.T) if vertical else paint
         lines += _straight(turned, thickest, vertical=vertical)
         lines += _dashed(turned, thickest, vertical=vertical)
-    free = [line for line in lines if _crosses(line, paint.shape) or _has_equals(line, lines)]
+    free = [
+        line
+        for line in lines
+        if _crosses(line, paint.shape) or _has_equals(line, lines, SHARED * width)
+    ]
     closed = _closed(lines, free, JOINT * min(height, width) + thickest)
     shortest = LEAST_SIDE * min(height, width)
     return free + [
@@ -231,15 +235,17 @@ def _crosses(line: Line, shape: tuple[int, ...]) -> bool:
     return length >= (UPRIGHT * shape[0] if line.vertical else CROSSING * shape[1])
 
 
-def _has_equals(line: Line, lines: list[Line]) -> bool:
+def _has_equals(line: Line, lines: list[Line], least: float) -> bool:
     """Return whether level lines of a good length begin and end together, as height lines do."""
-    ends = [
+    if line.vertical or line.stop - line.start < least:
+        return False
+    levels = {
         other.first
         for other in lines
-        if not (line.vertical or other.vertical)
+        if not other.vertical
         and max(abs(other.start - line.start), abs(other.stop - line.stop)) <= BROKEN_PX
-    ]
-    return len(set(ends)) >= EQUALS
+    }
+    return len(levels) >= EQUALS
 
 
 def _closed(lines: list[Line], free: list[Line], slack: float) -> list[Line]:

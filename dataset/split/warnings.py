@@ -255,15 +255,10 @@ def _scattered_strokes(found: SheetLayout, views: list[View]) -> list[str]:
     together = find_blobs(dilate(strokes, reach))
     said = []
     for number, (x, y, width, height) in enumerate(together.boxes.tolist()):
-        tall, pieces = (
-            height - 2 * reach,
-            len(np.unique(found.blobs.labels[together.labels == number + 1])),
-        )
-        if (
-            tall >= NEARLY_A_VIEW * usual
-            and width - 2 * reach >= SLENDER * tall
-            and pieces > PIECES
-        ):
+        tall, broad = height - 2 * reach, width - 2 * reach
+        if tall < NEARLY_A_VIEW * usual or broad < SLENDER * tall:
+            continue
+        if len(np.unique(found.blobs.labels[together.labels == number + 1])) > PIECES:
             x, y = ((v + reach) * found.cell_px for v in (x, y))
             said.append(
                 f"strokes at {x}, {y} lie together {100 * tall / usual:.0f} % as high as the "
