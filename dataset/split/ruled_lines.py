@@ -121,7 +121,10 @@ def _straight(paint: np.ndarray, thickest: int, *, vertical: bool) -> list[Line]
     bands = _stacked(list(runs))
     lines = [Line(*band, vertical) for band in bands if band[1] - band[0] < thickest]
     lines += _broken(paint, lines)
-    return [line for line in lines if _is_open(paint, line)]
+    shared = SHARED * paint.shape[1]
+    return [
+        line for line in lines if _is_open(paint, line, equals=_has_equals(line, lines, shared))
+    ]
 
 
 def _broken(paint: np.ndarray, lines: list[Line]) -> list[Line]:
@@ -130,7 +133,7 @@ def _broken(paint: np.ndarray, lines: list[Line]) -> list[Line]:
     They go on wherever there is paper, but behind clothes in the paper's colour, unless they begin
     and end where a whole line does: height lines are ruled together, and hems end earlier.
     """
-    found = []
+    found, long = list[Line](), list[Line]()
     across = [line for line in lines if line.stop - line.start >= CROSSING * paint.shape[1]]
     whole = [line for line in across if _is_open(paint, line)]
     for first in sorted({line.first for line in lines}):
@@ -151,7 +154,10 @@ def _broken(paint: np.ndarray, lines: list[Line]) -> list[Line]:
             )
             if crossed and (ruled or crossed >= THROUGHOUT * np.count_nonzero(open_)):
                 found.append(line)
-    return found
+                if line.vertical or length >= CROSSING * paint.shape[1]:
+                    long.append(line)
+    shared = SHARED * paint.shape[1]
+    return [line for line in found if line in long or _has_equals(line, found, shared)]
 
 
 def _dashed(paint: np.ndarray, thickest: int, *, vertical: bool) -> list[Line]:
@@ -209,14 +215,15 @@ def _stacked(runs: list[tuple[int, int, int]]) -> list[tuple[int, int, int, int]
     return done + growing
 
 
-def _is_open(paint: np.ndarray, line: Line) -> bool:
+def _is_open(paint: np.ndarray, line: Line, *, equals: bool = False) -> bool:
     columns = slice(line.start, line.stop)
     reach = line.last - line.first + 2
     above = paint[max(line.first - 1 - reach, 0) : max(line.first - 1, 0), columns]
     below = paint[line.last + 2 : line.last + 2 + reach, columns]
     closed_above = above.all(axis=0) & bool(len(above))
     closed_below = below.all(axis=0) & bool(len(below))
-    across = not line.vertical and line.stop - line.start >= SHARED * paint.shape[1]
+    length = line.stop - line.start
+    across = equals or (not line.vertical and length >= CROSSING * paint.shape[1])
     least = OPEN_ACROSS if across else OPEN_UPRIGHT if line.vertical else OPEN
     return bool(np.mean(~closed_above & ~closed_below) >= least)
 
@@ -239,13 +246,13 @@ def _has_equals(line: Line, lines: list[Line], least: float) -> bool:
     """Return whether level lines of a good length begin and end together, as height lines do."""
     if line.vertical or line.stop - line.start < least:
         return False
-    levels = {
+    levels = sorted(
         other.first
         for other in lines
         if not other.vertical
         and max(abs(other.start - line.start), abs(other.stop - line.stop)) <= BROKEN_PX
-    }
-    return len(levels) >= EQUALS
+    )
+    return 1 + int((np.diff(levels) > LEAST_RUN_PX).sum()) >= EQUALS  # no line drawn by hand
 
 
 def _closed(lines: list[Line], free: list[Line], slack: float) -> list[Line]:

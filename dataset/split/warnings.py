@@ -70,7 +70,7 @@ def figure_warnings(
         *_open_outlines(found, views),
         *_wide_views(views),
         *_whole_page(found, views, rgba),
-        *_panels(views),
+        *_panels(views, rgba),
         *_near_parts(found, views),
         *_other_groups(found),
         *_like_views(found, views, rgba),
@@ -152,10 +152,10 @@ def _whole_page(found: SheetLayout, views: list[View], rgba: np.ndarray) -> list
     ]
 
 
-def _panels(views: list[View]) -> list[str]:
+def _panels(views: list[View], rgba: np.ndarray) -> list[str]:
     """Return a line if views fill their boxes as panels do in which figures stand."""
     fill = [view.mask.sum() / (view.figure_box[2] * view.figure_box[3]) for view in views]
-    if np.median(fill) <= FULL:
+    if np.median(fill) <= FULL or (rgba[..., 3] < 255).any():  # cut out already
         return []
     return [
         "the views are nearly rectangles: if the figures stand on panels, take them off with "
