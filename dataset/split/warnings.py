@@ -30,6 +30,7 @@ MOST_STROKES = 0.08  # of a view: with more it is hollow somewhere
 STROKES = ("mark", "speck", "text")  # as which pieces of a pencil drawing are left out
 BROKEN = 0.05  # of the views' height: gaps between its pieces
 PIECES = 3  # no sword or ruler has more
+LEVEL = 0.7  # of their height: beside a view they stand in its row
 SLENDER = 0.12  # of its height: a drawing is no narrower
 WIDE = 1.28  # times the next widest of four or more: two figures, or a study that touches
 
@@ -249,7 +250,8 @@ def _like_views(found: SheetLayout, views: list[View], rgba: np.ndarray) -> list
 def _scattered_strokes(found: SheetLayout, views: list[View]) -> list[str]:
     """Return a line for strokes left out that lie together as high as a view: a pencil drawing."""
     kinds = np.array([*found.grouping.kinds, ""], dtype=object)
-    usual = float(np.median([view.figure_box[3] for view in views])) / found.cell_px
+    cell = found.cell_px
+    usual = float(np.median([view.figure_box[3] for view in views])) / cell
     reach = max(1, round(BROKEN / 2 * usual))
     strokes = np.isin(kinds, STROKES)[found.blobs.labels - 1]
     together = find_blobs(dilate(strokes, reach))
@@ -258,13 +260,21 @@ def _scattered_strokes(found: SheetLayout, views: list[View]) -> list[str]:
         tall, broad = height - 2 * reach, width - 2 * reach
         if tall < NEARLY_A_VIEW * usual or broad < SLENDER * tall:
             continue
+        if not any(_is_level((y + reach) * cell, tall * cell, view) for view in views):
+            continue
         if len(np.unique(found.blobs.labels[together.labels == number + 1])) > PIECES:
-            x, y = ((v + reach) * found.cell_px for v in (x, y))
+            x, y = (x + reach) * cell, (y + reach) * cell
             said.append(
                 f"strokes at {x}, {y} lie together {100 * tall / usual:.0f} % as high as the "
                 "views: if they are a drawing, close its outline"
             )
     return said
+
+
+def _is_level(top: int, tall: int, view: View) -> bool:
+    """Return whether something stands beside a view, not above or below it."""
+    _, first, _, height = view.figure_box
+    return min(top + tall, first + height) - max(top, first) >= LEVEL * tall
 
 
 def _shares(own: UInt8[np.ndarray, "n 3"], views: list[np.ndarray]) -> bool:
