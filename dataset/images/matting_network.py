@@ -94,7 +94,7 @@ def read_network(path: Path) -> MattingNetwork:
             f"{path}: is no ONNX network for colour pictures of a fixed size; take a matting "
             "network that rembg can use, such as u2net.onnx"
         )
-    mean, std = ((0.5,) * 3, (1.0,) * 3) if "isnet" in path.stem.lower() else (MEAN, STD)
+    mean, std = ((0.5, 0.5, 0.5), (1.0, 1.0, 1.0)) if "isnet" in path.stem.lower() else (MEAN, STD)
     return MattingNetwork(path, net, size, mean, std)
 
 
