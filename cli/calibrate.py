@@ -172,7 +172,7 @@ def calibrate(
         raise UsageError("--front does nothing beside --views or --landmarks-only; drop one")
     Cutting(boxes, grid, background, drop, group, outfit, matting).check()
     printer = Printer(as_json, quiet, verbose)
-    _check_files(sheets, hints, boxes, front=front is not None)
+    _check_files(sheets, hints, boxes, matting, front=front is not None)
     given = None if str(mesh) == NO_BODY else mesh
     body = _body(mesh, up)
     check_output(
@@ -200,7 +200,9 @@ def calibrate(
         raise typer.Exit(UNCERTAIN)
 
 
-def _check_files(sheets: list[Path], hints: Hints, boxes: Path | None, *, front: bool) -> None:
+def _check_files(
+    sheets: list[Path], hints: Hints, boxes: Path | None, matting: Path | None, *, front: bool
+) -> None:
     """Refuse files that are missing, or that say what an option says, too."""
     from toonset.dataset.bundle.transforms_read import transforms_file
     from toonset.dataset.split_folder.corrected import Given
@@ -211,6 +213,7 @@ def _check_files(sheets: list[Path], hints: Hints, boxes: Path | None, *, front:
     check_there(sheets, "picture", PictureError)
     check_there([landmarks], "landmark", LandmarkError)
     check_there([boxes], "boxes", SheetError)
+    check_there([matting], "matting network", PictureError)
     if hints.corrections is not None:
         Given.of(hints.corrections).check_beside(front=front)
     if hints.init is not None:

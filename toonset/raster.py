@@ -114,7 +114,7 @@ def from_nearest(
 ) -> Shaped[np.ndarray, "height width *bands"]:
     """Return every pixel's value at the nearest known pixel; some must be known.
 
-    A third of the time of `nearest`, whose distances are exact.
+    Half the time of `nearest`, whose distances are exact.
     """
     labelled = cv2.distanceTransformWithLabels(
         (~known).view(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL

@@ -189,15 +189,14 @@ def _panel(
         return None
     if np.abs(np.median(rgb[ground], axis=0) - paper.rgb).max() < APART:
         return None
-    shown = cv2.resize(paper.colors((0, 0, *size_wh)), rgb.shape[1::-1])
-    drawn = inside & (difference(rgb, shown) > SAME_PAPER)
+    shown = paper.colors((0, 0, *size_wh))
+    drawn = inside & (difference(rgb, cv2.resize(shown, rgb.shape[1::-1])) > SAME_PAPER)
     heights = _heights(drawn, np.zeros_like(drawn))
     if heights.max(initial=0) < FRAMED * np.count_nonzero(inside.any(axis=1)):
         return None
     beyond = dilate(own, CELLS) & ~dilate(inside, edge + CELLS)
     cells = inside | (dilate(beyond, edge + CELLS) & own)
     mask = cv2.resize(cells.view(np.uint8), size_wh, interpolation=cv2.INTER_NEAREST) > 0
-    shown = paper.colors((0, 0, *size_wh))
     return Pages(mask, np.dstack([shown, np.full_like(shown[..., :1], 255)]), 1, True, paper)
 
 

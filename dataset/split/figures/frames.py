@@ -35,9 +35,11 @@ def find_frames(blobs: Blobs, painted: Mask) -> Mask:
     found = np.zeros_like(painted)
     for number in _large(blobs):
         window, mask = blobs.window(number), blobs.mask(number)
+        if mask.mean() < FULL:
+            continue
         drawn = painted[window] & mask
         outer = connected_to(dilate(np.pad(~mask, 1, constant_values=True))[1:-1, 1:-1], drawn)
-        if mask.mean() < FULL or not _is_one_line(outer):
+        if not _is_one_line(outer):
             continue
         inside, areas = sized_parts(drawn & ~outer)
         rows = np.nonzero(inside)[0]
