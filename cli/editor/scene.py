@@ -100,12 +100,19 @@ def seen_on(sheet: Sheet) -> dict[str, Any]:
     }
 
 
-def sheet_url(path: Path) -> str:
-    """Return the sheet's picture as an address of itself, in a form that browsers show."""
+def sheet_url(path: Path, sheet: Sheet) -> str:
+    """Return the sheet's picture as an address of itself, in a form that browsers show.
+
+    The file as it is, if the views' places in it are those of its pixels.
+    """
     data = read_whole(path, "picture", PictureError)
     kind = next((kind for magic, kind in SHOWN.items() if data.startswith(magic)), None)
+    picture = decode_rgba(data, path)
+    (cut,) = sheet.pictures
+    if cut is not None and not np.array_equal(cut, picture):
+        picture, kind = cut, None
     if kind is None:
-        bgra = cv2.cvtColor(decode_rgba(data, path), cv2.COLOR_RGBA2BGRA)
+        bgra = cv2.cvtColor(picture, cv2.COLOR_RGBA2BGRA)
         data, kind = cv2.imencode(".png", bgra)[1].tobytes(), "image/png"
     return data_url(data, kind)
 

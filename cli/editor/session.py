@@ -86,7 +86,7 @@ class Session:
 
     def __post_init__(self) -> None:
         """Show the bundle, and fit it where its corrections are newer."""
-        self.picture = sheet_url(self.subject.sheet)
+        self.picture = sheet_url(self.subject.sheet, self.drawn.sheet)
         self._tried = self.fitted
         self._show()
         self._thread = threading.Thread(target=self._work, name="fit")

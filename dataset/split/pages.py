@@ -2,7 +2,8 @@
 
 A page is a smooth zone in another colour than the picture's own ground, whose outline is a
 rectangle, upright or seen at an angle, and on which most of what is drawn stands. What lies around
-it is not of the sheet and shows the page's nearest paper instead, so places stay as they are.
+it is not of the sheet and shows the page's nearest paper instead, so places stay as they are. A
+page that lies at an angle is seen from straight above first (`straightened`).
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Int, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.dataset.split.background import Background, difference, of_paper, ring_of
 from toonset.dataset.split.background_field import fit_zone
@@ -24,7 +25,8 @@ LEAST_PIECE = 0.005  # of the picture: ruled lines part a page into pieces
 SAME_PAPER = 32  # levels between the pieces of a page
 LINE = 4  # cells: ruled lines are no thicker
 APART = 10  # levels between page and ground: a frame on the same paper is no page
-RECTANGLE = 0.9  # of the smallest rectangle round it: paper seen at an angle fills less of it
+FOUR_SIDED = 0.95  # of the four-sided figure round it: more is cut off the corners of no page
+STEEPEST = 0.6  # of the smallest rectangle round it: paper seen at an angle fills less of it
 PLAIN_RIM = 0.85  # of the page's outline that its own colour takes
 PAPER = 0.35  # of the page that is not drawn on: less is a figure's outline
 CELLS = 3  # that a zone ends before its edge
@@ -40,6 +42,7 @@ PLAIN_PANEL = 0.4  # of its inner edge that smooth zones take: no picture
 SMOOTH = 0.95  # of these in the colours of one ground
 UPRIGHT_DEG = 0.5
 UPRIGHT = 0.97  # of the smallest rectangle: less is a perspective
+FOCAL = 0.75  # of a photograph's longer side: a telephone's lens
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,16 +78,96 @@ class Pages:
 
 @dataclass(frozen=True, eq=False)
 class _Page:
-    """One page, in cells: what it covers, its paper, its tallest drawing, whether it is upright."""
+    """One page, in cells: what it covers, its corners, its paper, its tallest drawing."""
 
     mask: Bool[np.ndarray, "rows columns"]
+    corners: Float[np.ndarray, "4 2"]
     paper: Bool[np.ndarray, "rows columns"]
     tallest: int
     upright: bool
 
 
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """A picture in cells: colours, smooth zones, what is around all of them, and the pages."""
+
+    rgb: UInt8[np.ndarray, "rows columns 3"]
+    labels: Int[np.ndarray, "rows columns"]
+    outer: Bool[np.ndarray, "rows columns"]
+    clear: bool
+    shrink: float
+    pages: list[_Page]
+
+
 def find_pages(rgba: UInt8[np.ndarray, "height width 4"]) -> Pages | None:
     """Return the pages on which a picture's figures are drawn; None if it is a page itself."""
+    seen = _seen(rgba)
+    if not seen.pages:
+        return None if seen.clear else _panel(rgba, seen.rgb, seen.labels, seen.outer)
+    mask, paper = (
+        cv2.resize(np.any(cells, axis=0).view(np.uint8), rgba.shape[1::-1], interpolation=0) > 0
+        for cells in ([page.mask for page in seen.pages], [page.paper for page in seen.pages])
+    )
+    around = from_nearest(rgba, paper)
+    return Pages(mask, around, len(seen.pages), all(page.upright for page in seen.pages))
+
+
+def straightened(
+    rgba: UInt8[np.ndarray, "height width 4"],
+) -> UInt8[np.ndarray, "height width 4"] | None:
+    """Return a picture of one page at an angle as it is seen from straight above.
+
+    The page's middle stays, and so does the picture's size; None where no page lies at an angle.
+    The page's proportions follow from its four corners and a camera of usual focal length that
+    looks at the picture's middle (Zhang and He, Whiteboard scanning and image enhancement, 2007).
+    """
+    seen = _seen(rgba)
+    if len(seen.pages) != 1 or seen.pages[0].upright:
+        return None
+    size = np.array(rgba.shape[1::-1])
+    corners = (seen.pages[0].corners + 0.5) / seen.shrink - 0.5
+    flat = _rectangle(corners, size)
+    matrix = cv2.getPerspectiveTransform(corners.astype(np.float32), flat.astype(np.float32))
+    return np.asarray(
+        cv2.warpPerspective(
+            rgba, matrix, size.tolist(), flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
+        )
+    )
+
+
+def _corners(hull: Int[np.ndarray, "corners 1 2"]) -> Float[np.ndarray, "4 2"] | None:
+    """Return the corners of an outline, clockwise from the upper left one."""
+    found = cv2.approxPolyN(hull.astype(np.float32), 4, ensure_convex=True).reshape(-1, 2)
+    if len(found) != 4:
+        return None
+    corners = np.asarray(found, dtype=np.float64)
+    away = corners - corners.mean(axis=0)
+    around = np.argsort(np.arctan2(away[:, 1], away[:, 0]))  # y points down: clockwise
+    first = int((corners[around] @ (1, 1)).argmin())
+    return corners[np.roll(around, -first)]
+
+
+def _rectangle(
+    corners: Float[np.ndarray, "4 2"], size_wh: Int[np.ndarray, " 2"]
+) -> Float[np.ndarray, "4 2"]:
+    """Return the upright rectangle, of the same area and middle, that four corners are seen of."""
+    focal = FOCAL * size_wh.max()
+    rays = np.column_stack([(corners - (size_wh - 1) / 2) / focal, np.ones(4)])
+    left_top, right_top, right_bottom, left_bottom = rays
+    diagonal = np.cross(left_top, right_bottom)
+    right = diagonal @ left_bottom / (np.cross(right_top, right_bottom) @ left_bottom)
+    down = diagonal @ right_top / (np.cross(left_bottom, right_bottom) @ right_top)
+    aspect = np.linalg.norm(right * right_top - left_top) / np.linalg.norm(
+        down * left_bottom - left_top
+    )
+    area = cv2.contourArea(corners.astype(np.float32))
+    half = np.sqrt(area * np.array([aspect, 1 / aspect])) / 2
+    half *= min(1.0, ((size_wh - 1) / 2 / half).min())
+    middle = np.clip(corners.mean(axis=0), half, size_wh - 1 - half)
+    return middle + half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+
+
+def _seen(rgba: UInt8[np.ndarray, "height width 4"]) -> _Seen:
     small, shrink = shrunk(rgba, LONGEST_PX)
     clear, ring = small[..., 3] < 128, ring_of(*small.shape[:2])
     rgb = _opaque(small, clear)
@@ -98,14 +181,9 @@ def find_pages(rgba: UInt8[np.ndarray, "height width 4"]) -> Pages | None:
     found = [_page(_sheet(int(n), labels, outer, rgb)) for n in large[large > 0]]
     pages = [page for page in found if page is not None]
     pages = [page for page in pages if not any(_is_in(page, other) for other in pages)]
-    if not pages or not _hold_all(pages, outer[labels]):
-        return None if clear.any() else _panel(rgba, rgb, labels, outer[labels])
-    mask, paper = (
-        cv2.resize(np.any(cells, axis=0).view(np.uint8), rgba.shape[1::-1], interpolation=0) > 0
-        for cells in ([page.mask for page in pages], [page.paper for page in pages])
-    )
-    around = from_nearest(rgba, paper)
-    return Pages(mask, around, len(pages), all(page.upright for page in pages))
+    if pages and not _hold_all(pages, outer[labels]):
+        pages = []
+    return _Seen(rgb, labels, outer[labels], bool(clear.any()), shrink, pages)
 
 
 def _opaque(rgba: np.ndarray, clear: np.ndarray) -> UInt8[np.ndarray, "rows columns 3"]:
@@ -141,12 +219,16 @@ def _page(own: Bool[np.ndarray, "rows columns"]) -> _Page | None:
     if not outlines:
         return None
     hull = cv2.convexHull(np.concatenate(outlines))
+    corners = _corners(hull)
     _, (width, height), angle = cv2.minAreaRect(hull)
-    filled = cv2.contourArea(hull) / max(width * height, 1)
+    area = cv2.contourArea(hull)
+    filled = area / max(width * height, 1)
     mask, rim = np.zeros(own.shape, np.uint8), np.zeros(own.shape, np.uint8)
     cv2.drawContours(mask, [hull], -1, 1, cv2.FILLED)
     cv2.drawContours(rim, [hull], -1, 1, 1)
-    if filled < RECTANGLE or dilate(own, CELLS)[rim > 0].mean() < PLAIN_RIM:
+    if corners is None or area < FOUR_SIDED * cv2.contourArea(corners.astype(np.float32)):
+        return None
+    if filled < STEEPEST or dilate(own, CELLS)[rim > 0].mean() < PLAIN_RIM:
         return None
     if own.sum() < PAPER * np.count_nonzero(mask):
         return None
@@ -156,7 +238,7 @@ def _page(own: Bool[np.ndarray, "rows columns"]) -> _Page | None:
     if (heights >= THING * tall).sum() < 2 and tallest < ALONE * tall:
         return None
     tilt = abs((angle + 45) % 90 - 45)
-    return _Page(mask > 0, own, tallest, tilt <= UPRIGHT_DEG and filled >= UPRIGHT)
+    return _Page(mask > 0, corners, own, tallest, tilt <= UPRIGHT_DEG and filled >= UPRIGHT)
 
 
 def _panel(

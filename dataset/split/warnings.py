@@ -36,12 +36,12 @@ WIDE = 1.28  # times the next widest of four or more: two figures, or a study th
 
 
 def page_warnings(pages: Pages | None) -> tuple[str, ...]:
-    """Return a line if the paper lies at an angle: the drawings are cut as they are seen."""
+    """Return a line if pages lie at an angle: their drawings are cut as they are seen."""
     if pages is None or pages.upright:
         return ()
     return (
-        "the paper does not fill the picture and lies at an angle: straighten it and crop it to "
-        "the paper for true proportions",
+        "paper lies at an angle and is cut as it is seen: straighten it and crop the picture to it "
+        "for true proportions",
     )
 
 

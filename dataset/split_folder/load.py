@@ -20,6 +20,7 @@ from toonset.dataset.images.layers import layers_line
 from toonset.dataset.images.matting_network import MattingNetwork, read_network, without_background
 from toonset.dataset.images.picture import decode_rgba
 from toonset.dataset.split.captions import with_captions
+from toonset.dataset.split.pages import straightened
 from toonset.dataset.split.sheet import SheetOptions, split_picture
 from toonset.dataset.split_folder.boxes import check_boxes, read_boxes
 from toonset.dataset.split_folder.checks import odd_files
@@ -36,6 +37,7 @@ from toonset.view import SHEET, InputFile, Origin, View
 
 Picture = UInt8[np.ndarray, "height width 4"]
 Paths = str | Path | Sequence[str | Path]
+STRAIGHTENED = "the page lies at an angle: places are those of the page seen from straight above"
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,12 +261,16 @@ def _of_sheet(
     picture = decode_rgba(data, path)
     if network is not None:
         picture = without_background(picture, network)
+    flat = straightened(picture)
+    picture = picture if flat is None else flat
     height, width = picture.shape[:2]
     check_boxes(options.boxes, (width, height), where)
     try:
         found = with_captions(picture, split_picture(picture, options))
     except SheetError as error:
         raise SheetError(f"{path}: {error}") from error
+    if flat is not None:
+        found = replace(found, remarks=(STRAIGHTENED, *found.remarks))
     if data.startswith(photoshop.MAGIC):
         boxes = [view.figure_box for view in found.views]
         line = layers_line(photoshop.photoshop_layers(data, path), (width, height), boxes)

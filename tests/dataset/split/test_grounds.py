@@ -1,17 +1,21 @@
 """Grounds that are no plain paper: pages in a picture, patterns, steps, faint alpha, watermarks."""
 
+import base64
 import io
 from collections.abc import Callable
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 from PIL import Image
 
+from toonset.cli.editor.scene import sheet_url
 from toonset.dataset.split.background import remove_residual_alpha, ring_of
 from toonset.dataset.split.background_zones import find_zones, fit_steps
-from toonset.dataset.split.pages import find_pages
+from toonset.dataset.split.pages import find_pages, straightened
 from toonset.dataset.split.sheet import Segmentation, split_picture
+from toonset.dataset.split_folder.load import split_sheet
 
 WIDTH, HEIGHT, FIGURES = 800, 260, 4
 BLACK, TEAL, SKIN, BROWN = (10, 10, 10), (38, 138, 140), (250, 205, 165), (124, 72, 48)
@@ -217,7 +221,43 @@ def test_cards_on_transparency(cards: int, paper: tuple[int, int, int]) -> None:
     assert found.background == paper
 
 
-def test_paper_on_a_desk_is_cut_and_told() -> None:
+def photographed(page: Picture, tilt: float, pan: float, roll: float) -> Picture:
+    """Return a page on a desk as a camera of focal length .75 sees it."""
+    size, (height, width) = np.array((2400, 1800)), page.shape[:2]
+    turns = [
+        cv2.Rodrigues(np.radians(a) * np.eye(3)[i])[0] for i, a in enumerate((tilt, pan, roll))
+    ]
+    signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    corners = np.column_stack([signs * (width, height) / width / 2, np.zeros(4)])
+    seen = corners @ (turns[0] @ turns[1] @ turns[2]).T + (0, 0, 1.1)
+    places = 0.75 * size[0] * seen[:, :2] / seen[:, 2:] + size / 2
+    flat = (signs + 1) * (width / 2, height / 2)
+    matrix = cv2.getPerspectiveTransform(flat.astype(np.float32), places.astype(np.float32))
+    cover = cv2.warpPerspective(np.ones((height, width), np.float32), matrix, size.tolist())
+    photo = cv2.warpPerspective(page, matrix, size.tolist(), flags=cv2.INTER_AREA)
+    cover = cover[..., None]
+    return (cover * photo + (1 - cover) * np.array((100, 70, 50))).astype(np.uint8)
+
+
+@pytest.mark.parametrize("angles", [(0, 0, 6), (25, 10, -8), (10, 28, 12)])
+def test_paper_on_a_desk_is_straightened(angles: tuple[float, float, float]) -> None:
+    page, _ = figures(plain(245))
+    large = cv2.resize(page, None, fx=2, fy=2)
+    photo = opaque(jpeg(photographed(large, *angles), 90))
+    flat = straightened(photo)
+    assert flat is not None
+    assert flat.shape == photo.shape
+    found = split_picture(flat)
+    boxes = np.array([view.figure_box for view in found.views], float)
+    true = np.array([view.figure_box for view in split_picture(opaque(page)).views], float)
+    assert len(boxes) == len(true) == FIGURES
+    shape, wanted = boxes[:, 2] / boxes[:, 3], true[:, 2] / true[:, 3]
+    np.testing.assert_allclose(shape, wanted, rtol=0.03)
+    np.testing.assert_allclose(boxes[:, 1:], boxes[:1, 1:].repeat(FIGURES, axis=0), atol=4)
+    assert not any("angle" in line for line in found.warnings)
+
+
+def test_papers_at_angles_are_cut_as_they_are_and_told() -> None:
     page, mask = figures(plain(245))
     corners = np.array([[0, 0], [WIDTH, 0], [WIDTH, HEIGHT], [0, HEIGHT]], np.float32)
     seen = np.array([[40, 40], [850, 60], [830, 350], [25, 330]], np.float32)
@@ -228,8 +268,20 @@ def test_paper_on_a_desk_is_cut_and_told() -> None:
     )
     truth = cv2.warpPerspective(mask.view(np.uint8), matrix, (900, 400)) > 0
     photo = np.where(cover[..., None] > 127, photo, np.array((100, 70, 50), np.uint8))
-    found = assert_right(opaque(jpeg(photo, 90)), truth)
+    found = split_picture(np.vstack([opaque(jpeg(photo, 90))] * 2))
+    assert len(found.views) == 2 * FIGURES
+    assert overlap(found, np.vstack([truth] * 2)) >= 0.95
+    assert straightened(np.vstack([opaque(photo)] * 2)) is None
     assert any("lies at an angle" in line for line in found.warnings)
+
+
+@pytest.mark.parametrize("page", [figures(plain(255))[0], jpeg(figures(plain((250, 240, 230)))[0])])
+def test_an_upright_page_is_left_as_it_is(page: Picture) -> None:
+    desk = plain((100, 70, 50), WIDTH + 120, HEIGHT + 100)
+    desk[50 : 50 + HEIGHT, 60 : 60 + WIDTH] = page
+    assert find_pages(opaque(desk)) is not None
+    assert straightened(opaque(desk)) is None
+    assert straightened(opaque(page)) is None
 
 
 def test_a_panel_beside_the_figures_is_no_page() -> None:
@@ -330,3 +382,25 @@ def test_a_boxy_figure_is_no_panel() -> None:
     (view,) = split_picture(rgba).views
     assert view.figure_box == (40, 30, 221, 271)
     assert view.mask[20, 20]
+
+
+def test_places_are_those_of_the_straightened_picture(tmp_path: Path) -> None:
+    page = cv2.resize(figures(plain(245))[0], None, fx=2, fy=2)
+    photo = photographed(page, 25, 10, -8)
+    file = tmp_path / "desk.png"
+    Image.fromarray(photo).save(file)
+    sheet = split_sheet(file)
+    (picture,), (source,) = sheet.pictures, sheet.split.sources
+    assert "seen from straight above" in source.remarks[0]
+    assert source.size_wh == photo.shape[1::-1]
+    assert len(sheet.views) == FIGURES
+    for view in sheet.views:
+        left, top, width, height = view.box
+        shown = picture[top : top + height, left : left + width, :3][view.mask]
+        assert (
+            np.abs(shown.astype(int) - view.rgba[view.mask][:, :3]).mean() < 4
+        )  # rims are without paper
+    shown = cv2.imdecode(
+        np.frombuffer(base64.b64decode(sheet_url(file, sheet).partition(",")[2]), np.uint8), 1
+    )
+    np.testing.assert_array_equal(shown[..., ::-1], picture[..., :3])
