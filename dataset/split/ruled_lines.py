@@ -7,7 +7,7 @@ letter is not a ruled line.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -17,6 +17,7 @@ LEAST_RUN = 0.04  # of the sheet's side along the line
 LEAST_RUN_PX = 24
 LEAST_SHEET = 100  # cells on the shorter side: on a smaller picture a line is part of a drawing
 THICKEST = 0.015  # of the sheet's shorter side
+BAR = 0.05  # of its height: one from edge to edge, on which figures stand
 THICKEST_PX = 6  # whatever the sheet's size
 CROSSING = 0.6  # of the sheet's width: a line this long needs no others
 SHARED = 0.3  # of its width: shorter, if several begin and end with it
@@ -38,6 +39,7 @@ STANDING_OUT = 4  # times what rows have of them on the average: else they are a
 LONGEST_DASH = 0.1  # of the sheet's side
 JOINT = 0.02  # of the shorter side: corners may miss each other by so much
 THROUGHOUT = 0.75  # of the columns with paper above and below that a broken line crosses
+SOFT_PX = 3  # from figures: nearer to them a line's soft edge is left
 BROKEN_PX = 5  # gaps in a run that noise may leave
 
 
@@ -97,19 +99,45 @@ def find_lines(paint: Bool[np.ndarray, "height width"]) -> list[Line]:
 def line_pixels(
     paint: Bool[np.ndarray, "height width"], lines: list[Line]
 ) -> Bool[np.ndarray, "height width"]:
-    """Return the pixels of the lines, except where a figure stands on both of their sides."""
+    """Return the pixels of the lines, except where a figure or its outline goes through them."""
     found = np.zeros(paint.shape, dtype=bool)
     for line in lines:
         source, target = (paint.T, found.T) if line.vertical else (paint, found)
         columns = slice(line.start, line.stop)
         above, below = _beside(source, line)
-        target[line.first : line.last + 1, columns] |= ~(above & below)
+        target[line.first : line.last + 1, columns] |= ~(
+            (above & below) | _slanting(source, line, above, below)
+        )
+        near = _near(above | below, SOFT_PX)
+        for edge in (line.first - 1, line.last + 1):
+            if not line.vertical and 0 <= edge < len(target):
+                target[edge, columns] |= ~near  # its soft edge, not that of a leg's outline
     return found & paint
+
+
+def _slanting(
+    paint: np.ndarray, line: Line, above: np.ndarray, below: np.ndarray
+) -> Bool[np.ndarray, " columns"]:
+    """Return the columns between which something slants through a line and goes on beyond it."""
+    reach = line.last - line.first + 1
+    farther = replace(line, first=line.first - 2 * reach, last=line.last + 2 * reach)
+    over, under = (_near(mask, 2 * reach) for mask in _beside(paint, farther))
+    over, under = over & above, under & below
+    after = np.ones(2 * reach + 1)
+    size = len(over)
+    right_of_over, right_of_under = (np.convolve(m, after)[:size] > 0 for m in (over, under))
+    left_of_over, left_of_under = (np.convolve(m, after)[-size:] > 0 for m in (over, under))
+    return np.asarray((right_of_over & left_of_under) | (left_of_over & right_of_under))
+
+
+def _near(mask: np.ndarray, reach: int) -> Bool[np.ndarray, " columns"]:
+    return np.asarray(np.convolve(mask, np.ones(2 * reach + 1), "same")[: len(mask)] > 0)
 
 
 def _straight(paint: np.ndarray, thickest: int, *, vertical: bool) -> list[Line]:
     """Return thin horizontal lines with paper beside them."""
     least = max(LEAST_RUN_PX, round(LEAST_RUN * paint.shape[1]))
+    bar = thickest if vertical else max(thickest, round(BAR * paint.shape[0]))
     whole = cv2.morphologyEx(
         paint.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((1, BROKEN_PX), np.uint8)
     )
@@ -119,7 +147,11 @@ def _straight(paint: np.ndarray, thickest: int, *, vertical: bool) -> list[Line]
     long = stops - starts >= least
     runs = zip(rows[long].tolist(), starts[long].tolist(), stops[long].tolist(), strict=True)
     bands = _stacked(list(runs))
-    lines = [Line(*band, vertical) for band in bands if band[1] - band[0] < thickest]
+    lines = [
+        Line(*band, vertical)
+        for band in bands
+        if band[1] - band[0] < (thickest if band[3] - band[2] < paint.shape[1] else bar)
+    ]
     lines += _broken(paint, lines)
     shared = SHARED * paint.shape[1]
     return [
@@ -134,30 +166,55 @@ def _broken(paint: np.ndarray, lines: list[Line]) -> list[Line]:
     and end where a whole line does: height lines are ruled together, and hems end earlier.
     """
     found, long = list[Line](), list[Line]()
-    across = [line for line in lines if line.stop - line.start >= CROSSING * paint.shape[1]]
+    side = paint.shape[1]
+    across = [line for line in lines if line.stop - line.start >= CROSSING * side]
     whole = [line for line in across if _is_open(paint, line)]
     for first in sorted({line.first for line in lines}):
         own = [line for line in lines if line.first == first]
+        last, vertical = max(line.last for line in own), own[0].vertical
         length = sum(line.stop - line.start for line in own)
-        least = UPRIGHT if own[0].vertical else SHARED
-        if len(own) > 1 and length >= least * paint.shape[1]:
-            start, stop = min(line.start for line in own), max(line.stop for line in own)
-            last = max(line.last for line in own)
-            line = Line(first, last, start, stop, own[0].vertical)
-            above, below = _beside(paint, line)
-            open_ = np.asarray(~above & ~below)
-            drawn = np.all(paint[first : last + 1, start:stop], axis=0)
-            crossed = np.count_nonzero(drawn & open_)
-            ruled = any(
-                max(abs(other.start - start), abs(other.stop - stop)) <= BROKEN_PX
-                for other in whole
-            )
-            if crossed and (ruled or crossed >= THROUGHOUT * np.count_nonzero(open_)):
+        line = Line(first, last, min(x.start for x in own), max(x.stop for x in own), vertical)
+        level = _level(paint, line, lines)
+        apart = (other for other in whole if abs(other.first - first) > LEAST_RUN_PX)
+        if any(_ends_with(level, other) for other in apart):
+            if not any(_is_on(level, other) for other in (*found, *whole)):
+                found.append(level)
+        elif len(own) > 1 and length >= (UPRIGHT if vertical else SHARED) * side:
+            open_, rows = _open(paint, line), paint[first : last + 1, line.start : line.stop]
+            if open_.any() and rows.all(axis=0)[open_].mean() >= THROUGHOUT:
                 found.append(line)
-                if line.vertical or length >= CROSSING * paint.shape[1]:
-                    long.append(line)
-    shared = SHARED * paint.shape[1]
-    return [line for line in found if line in long or _has_equals(line, found, shared)]
+        if line in found and (vertical or length >= CROSSING * side):
+            long.append(line)
+    return [line for line in found if line in long or _has_equals(line, found, SHARED * side)]
+
+
+def _level(paint: np.ndarray, line: Line, lines: list[Line]) -> Line:
+    """Return a line as far as pieces on its level go: it may drift, and short ones are no runs."""
+    near = [x for x in lines if line.first - 1 <= x.first and x.last <= line.last + 1]
+    drawn = paint[line.first : line.last + 1].any(axis=0)
+    drawn &= _open(paint, replace(line, start=0, stop=paint.shape[1]))
+    edges = np.diff(np.pad(drawn, 1).astype(np.int8))
+    starts, stops = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    long = stops - starts > BROKEN_PX
+    start = min(starts[long].min(initial=len(drawn)), *(x.start for x in near))
+    stop = max(stops[long].max(initial=0), *(x.stop for x in near))
+    return replace(line, start=int(start), stop=int(stop))
+
+
+def _open(paint: np.ndarray, line: Line) -> Bool[np.ndarray, " columns"]:
+    """Return the columns of a line with paper above and below."""
+    above, below = _beside(paint, line)
+    return np.asarray(~above & ~below)
+
+
+def _ends_with(line: Line, other: Line) -> bool:
+    """Return whether two lines begin and end together."""
+    return max(abs(other.start - line.start), abs(other.stop - line.stop)) <= BROKEN_PX
+
+
+def _is_on(line: Line, other: Line) -> bool:
+    """Return whether two lines share rows."""
+    return line.first <= other.last + 1 and other.first <= line.last + 1
 
 
 def _dashed(paint: np.ndarray, thickest: int, *, vertical: bool) -> list[Line]:
@@ -247,10 +304,7 @@ def _has_equals(line: Line, lines: list[Line], least: float) -> bool:
     if line.vertical or line.stop - line.start < least:
         return False
     levels = sorted(
-        other.first
-        for other in lines
-        if not other.vertical
-        and max(abs(other.start - line.start), abs(other.stop - line.stop)) <= BROKEN_PX
+        other.first for other in lines if not other.vertical and _ends_with(line, other)
     )
     return 1 + int((np.diff(levels) > LEAST_RUN_PX).sum()) >= EQUALS  # no line drawn by hand
 
