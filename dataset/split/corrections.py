@@ -24,7 +24,7 @@ from toonset.dataset.split.figures.open_outlines import LINE, Gap, close_outline
 from toonset.dataset.split.figures.rows import Group, Taken, find_groups
 from toonset.dataset.split.figures.shadows import find_shadows
 from toonset.dataset.split.touching.cut import Cut, part_touching
-from toonset.raster import connected_to, wider_than
+from toonset.raster import connected_to, dilate, parts, wider_than
 from toonset.view import Box
 
 MOST_LOST = 0.2  # of a figure that a shadow alone encloses
@@ -128,17 +128,32 @@ def remove_frames(state: SheetState) -> SheetState | None:
 def fill_open_outlines(state: SheetState) -> SheetState | None:
     """Propose figures whose outlines have gaps, with their insides.
 
-    Where figures are painted, sketches beside them stay as they are.
+    Where figures are painted, sketches beside them stay as they are, and what lies between two of
+    them belongs to neither.
     """
     filled, gaps = close_outlines(state.painted & ~state.ruled, state.paper, state.ring)
     if gaps and _are_painted(state):
         own = np.zeros_like(filled)
         for number in state.main_blobs:
             own[state.blobs.window(int(number))] = True
+        own &= ~dilate(_between(state, filled), 1)
         filled, gaps = filled & own, tuple(gap for gap in gaps if own[gap.y, gap.x])
     if not gaps:
         return None
     return replace(state, filled=filled, gaps=gaps).with_paper()
+
+
+def _between(
+    state: SheetState, filled: Bool[np.ndarray, "rows columns"]
+) -> Bool[np.ndarray, "rows columns"]:
+    """Return the filled patches that touch two figures."""
+    patches = parts(filled)
+    touched = np.zeros(int(patches.max(initial=0)) + 1, dtype=int)
+    for number in state.main_blobs:
+        body = dilate(state.blobs.labels == number + 1, 1)
+        touched[np.unique(patches[body])] += 1
+    touched[0] = 0
+    return np.asarray(touched[patches] > 1)
 
 
 def _are_painted(state: SheetState) -> bool:
