@@ -5,9 +5,9 @@ from __future__ import annotations
 import shlex
 from dataclasses import replace
 from enum import StrEnum
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -22,6 +22,15 @@ from toonset.cli.common.cutting import (
     MattingOption,
     OutfitOption,
 )
+from toonset.cli.common.outfits import (
+    about,
+    check_outfit_output,
+    cut_outfits,
+    first_row,
+    naming,
+    outfit_folders,
+    print_results,
+)
 from toonset.cli.common.output import (
     OUTPUT_PANEL,
     ForceFlag,
@@ -33,7 +42,6 @@ from toonset.cli.common.output import (
     VerboseFlag,
 )
 from toonset.symmetric import Symmetric
-from toonset.write import check_output
 
 if TYPE_CHECKING:
     from toonset.calib.hints import Hints
@@ -154,7 +162,8 @@ def calibrate(
     """Fit one camera per drawing by aligning its outline with a posed mannequin.
 
     Writes a bundle: transforms.json, images/, calibration.json, overlay.png and mannequin.obj. Exit
-    code 3 when a view is weak, ambiguous or failed; the files are written then too.
+    code 3 when a view is weak, ambiguous or failed; the files are written then too. --outfit all
+    writes a bundle for each outfit, A/, B/ and so on.
     """
     from toonset.calib.hints import Hints
     from toonset.calib.verdict.report import calibration_dict
@@ -170,15 +179,16 @@ def calibrate(
     hints.check()
     if front is not None and (labels or landmarks_only):
         raise UsageError("--front does nothing beside --views or --landmarks-only; drop one")
-    Cutting(boxes, grid, background, drop, group, outfit, matting).check()
+    row = first_row(outfit, drop=drop, corrections=corrections, landmarks=landmarks, init=init)
+    Cutting(boxes, grid, background, drop, group, row, matting).check()
     printer = Printer(as_json, quiet, verbose)
     _check_files(sheets, hints, boxes, matting, front=front is not None)
     given = None if str(mesh) == NO_BODY else mesh
     body = _body(mesh, up)
-    check_output(
-        out, [*sheets, given, landmarks, init, boxes, matting, corrections], WRITTEN, force=force
-    )
-    sheet = split_sheet(
+    inputs = [*sheets, given, landmarks, init, boxes, matting, corrections]
+    check_outfit_output(out, outfit, inputs, WRITTEN, force=force)
+    cut = partial(
+        split_sheet,
         sheets,
         boxes=boxes,
         grid=grid,
@@ -187,16 +197,23 @@ def calibrate(
         labels=labels,
         corrections=corrections,
         group=group,
-        outfit=outfit,
         matting=matting,
     )
-    if front is not None:
-        hints = replace(hints, labels=front_label(front, len(sheet.views)))
-    found = _fitted(sheet, body, hints, seed, printer)
-    save_bundle(out, found, force=force)
-    _say_result(found, out, printer)
-    printer.result({"bundle": out, **calibration_dict(found)}, str(out))
-    if not found.is_certain:
+    found: dict[str, Calibration] = {}
+    for letter, sheet in cut_outfits(sheets, outfit, cut).items():
+        with naming(letter):
+            if front is not None:
+                hints = replace(hints, labels=front_label(front, len(sheet.views)))
+            found[letter] = _fitted(sheet, body, hints, seed, about(printer, letter))
+    with outfit_folders(out, found, force=force) as folder:
+        for letter, one in found.items():
+            save_bundle(folder / letter, one, force=force)
+    told = dict[str, dict[str, Any]]()
+    for letter, one in found.items():
+        _say_result(one, out / letter, about(printer, letter))
+        told[letter] = {"bundle": out / letter, **calibration_dict(one)}
+    print_results(out, told, printer)
+    if not all(one.is_certain for one in found.values()):
         raise typer.Exit(UNCERTAIN)
 
 

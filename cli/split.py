@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -19,8 +20,15 @@ from toonset.cli.common.cutting import (
     MattingOption,
     OutfitOption,
 )
+from toonset.cli.common.outfits import (
+    about,
+    check_outfit_output,
+    cut_outfits,
+    first_row,
+    outfit_folders,
+    print_results,
+)
 from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag
-from toonset.write import check_output
 
 if TYPE_CHECKING:
     from toonset.dataset.split_folder.load import Sheet
@@ -62,21 +70,24 @@ def split(
     Writes images/, split.json and overlay.png, the sheet with numbered boxes: look at it, correct
     with the options below or in images/ itself (delete, rename, repaint), and give the folder to
     `toonset calibrate`. Exit code 3 when something is doubtful; the files are written then too.
+    --outfit all writes a folder for each outfit, A/, B/ and so on.
     """
     from toonset.dataset.split_folder.cutting import Cutting
     from toonset.dataset.split_folder.load import split_sheet
     from toonset.dataset.split_folder.overlay import draw_sheet
-    from toonset.dataset.split_folder.write import write_split
+    from toonset.dataset.split_folder.write import split_dict, write_split
     from toonset.errors import PictureError, SheetError
     from toonset.read import check_there
 
-    Cutting(boxes, grid, background, drop, group, outfit, matting).check()
+    row = first_row(outfit, drop=drop)
+    Cutting(boxes, grid, background, drop, group, row, matting).check()
     printer = Printer(as_json, quiet)
     check_there(sheets, "picture", PictureError)
     check_there([boxes], "boxes", SheetError)
     check_there([matting], "matting network", PictureError)
-    check_output(out, [*sheets, boxes, matting], WRITTEN, force=force)
-    sheet = split_sheet(
+    check_outfit_output(out, outfit, [*sheets, boxes, matting], WRITTEN, force=force)
+    cut = partial(
+        split_sheet,
         sheets,
         boxes=boxes,
         grid=grid,
@@ -84,17 +95,23 @@ def split(
         drop=drop,
         labels=labels,
         group=group,
-        outfit=outfit,
         matting=matting,
     )
-    write_split(out, sheet.split, draw_sheet(sheet), sheet.options, force=force)
-    _say(sheet, out, printer)
-    if sheet.warnings:
+    found = cut_outfits(sheets, outfit, cut)
+    with outfit_folders(out, found, force=force) as folder:
+        for letter, sheet in found.items():
+            overlay = draw_sheet(sheet)
+            write_split(folder / letter, sheet.split, overlay, sheet.options, force=force)
+    told = dict[str, dict[str, Any]]()
+    for letter, sheet in found.items():
+        _say(sheet, out / letter, about(printer, letter))
+        told[letter] = {"folder": out / letter, **split_dict(sheet.split, sheet.options)}
+    print_results(out, told, printer)
+    if any(sheet.warnings for sheet in found.values()):
         raise typer.Exit(DOUBTFUL)
 
 
 def _say(sheet: Sheet, out: Path, printer: Printer) -> None:
-    from toonset.dataset.split_folder.write import split_dict
     from toonset.palette.names import hex_of
 
     for note in sheet.skipped:
@@ -126,7 +143,6 @@ def _say(sheet: Sheet, out: Path, printer: Printer) -> None:
     if "drop" in sheet.options:
         printer.say("views are numbered anew; --drop counts as in the overlay without it")
     printer.say(f"look at {out / 'overlay.png'}")
-    printer.result({"folder": out, **split_dict(named, sheet.options)}, str(out))
 
 
 def _source_line(source: Source) -> str:

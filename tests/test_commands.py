@@ -23,6 +23,7 @@ from typer.testing import CliRunner
 
 from bench.batch.sheets import write_sheets
 from bench.cases.bodies import random_body
+from bench.messy.sheet import make_messy_sheet
 from tests.bench.stand_ins import measure_nothing
 from tests.conftest import calibration_report
 from tests.test_documents import DOCUMENTS, text_of
@@ -110,6 +111,7 @@ def drawings(drawn: Path, tmp_path_factory: pytest.TempPathFactory, toonset: Too
     for name in ("dark.ase", "my.ase"):
         shutil.copy(folder / "bundle" / "palette.ase", folder / name)
     _six_figures(folder)
+    (folder / "outfits.png").write_bytes(encode_png(make_messy_sheet(6211, ("outfits",)).rgba))
     write_sheets(folder / "library", 2)
 
     shutil.copytree(drawn, folder / "small")
@@ -187,7 +189,7 @@ GIVEN = {  # what lies in a document's folder before its first command
     " eight/lying.stl eight/other colmap_folder",
     "docs/guide_corrections.md": "small/sheet.png small/mannequin.obj small/corrections.json",
     "docs/guide_palette.md": "bundle sheet.png my.ase",
-    "docs/guide_sheets.md": "six/sheet.png strip.png front.png side.png boxes.csv",
+    "docs/guide_sheets.md": "six/sheet.png strip.png front.png side.png boxes.csv outfits.png",
     "docs/guide_training.md": "bundle held_out other dark.ase",
     "docs/guide_viewer.md": "bundle",
 }

@@ -48,6 +48,8 @@ def command() -> Iterator[None]:
 def claim(path: Path, name: Path | None = None) -> None:
     """Hold an output until the command ends; nothing outside of a command.
 
+    Nor within a temporary folder: it is its writer's own, and will have another name by then.
+
     Args:
         path: the output.
         name: what a message calls it, if it is another one's of its set.
@@ -56,7 +58,7 @@ def claim(path: Path, name: Path | None = None) -> None:
         OutputError: another process holds it.
     """
     stack = _COMMAND.get()
-    if stack is not None:
+    if stack is not None and not any(is_temporary(folder.name) for folder in path.parents):
         stack.enter_context(hold(path, name))
 
 

@@ -12,7 +12,7 @@ import json
 import pkgutil
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from enum import Enum
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -208,7 +208,7 @@ def _check_values(stage: str, values: Mapping[str, Any]) -> None:
     if stage == "calibrate":
         labels, locked = values["labels"], tuple(lock.value for lock in values["locked"] or ())
         Hints(labels, values["landmarks"], values["landmarks_only"], values["init"], locked).check()
-        Cutting(*(values[name] for name in ("boxes", "grid", "background", "drop"))).check()
+        Cutting(**{field.name: values[field.name] for field in fields(Cutting)}).check()
         if labels:
             parse_labels(labels, labels.count(",") + 1)
     if stage == "palette":

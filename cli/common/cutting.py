@@ -58,7 +58,8 @@ OutfitOption = Annotated[
     typer.Option(
         "--outfit",
         metavar="LETTER",
-        help="One row of the group, where rows show other clothes: A is the uppermost.",
+        help="One row of the group, where rows show other clothes: A is the uppermost; all: a "
+        "folder for each row.",
         rich_help_panel=CORRECTIONS_PANEL,
     ),
 ]

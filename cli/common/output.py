@@ -51,6 +51,7 @@ class Printer:
     as_json: bool = False
     quiet: bool = False
     verbose: bool = False
+    subject: str = ""  # begins every line for people
     _last: float = field(default=0.0)
 
     def say(self, text: str) -> None:
@@ -66,12 +67,13 @@ class Printer:
     def doubt(self, text: str) -> None:
         """Print on stderr what to look at, quiet or not: why the exit code is 3, or a run weak."""
         self._clear()
-        say(f"{_shown(text)}\n")
+        say(f"{_shown(self.subject + text)}\n")
 
     def progress(self, text: str) -> None:
         """Show where the work stands: one live line on a terminal, a line every 5 s in a log."""
         if self.quiet:
             return
+        text = self.subject + text
         if sys.stderr.isatty():
             self._clear()
             say(_shown(text))

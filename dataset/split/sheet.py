@@ -392,7 +392,10 @@ def _remarks(
     said += [f"{NAMES[kind]} left out ({kinds.count(kind)})" for kind in NAMES if kind in kinds]
     if found.groups and found.groups[found.taken.group].outfits and found.taken.outfit is None:
         last = chr(ord("A") + len(found.groups[found.taken.group].rows) - 1)
-        said.append(f"the rows show the same directions: take one with --outfit A to {last}")
+        said.append(
+            f"the rows show the same directions: take one with --outfit A to {last}, or each with "
+            "--outfit all"
+        )
     if found.lines:
         said.append(f"ruled lines and frames were taken for paper ({len(found.lines)})")
     if found.shadow.any():

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from string import ascii_uppercase
 from typing import Any
 
 import numpy as np
@@ -82,6 +83,18 @@ class Sheet:
         warned = [f"{source.name}: {text}" for source in cut_now for text in source.warnings]
         return (*warned, *self.notes)
 
+    @property
+    def outfits(self) -> tuple[str, ...]:
+        """Return the letters of the rows that show the same directions, in other clothes.
+
+        `split_sheet` takes each of them as `outfit`. There are none where the rows of the group
+        that was taken go on turning, of several sheets, and of a split folder.
+        """
+        if len(self.pictures) != 1 or self.pictures[0] is None:
+            return ()
+        taken = (group for group in self.split.sources[0].groups if group.taken and group.outfits)
+        return tuple(ascii_uppercase[: sum(len(group.rows) for group in taken)])
+
 
 def split_sheet(
     sheet: Paths,
@@ -109,7 +122,8 @@ def split_sheet(
         corrections: file of what a person corrected of one of the sheets (docs/formats.md).
         group: number of the group of equal figures, from 1, as split.json lists them; None: the
             likeliest turnaround.
-        outfit: letter of a row of the group, "A" is the uppermost; "": all rows.
+        outfit: letter of a row of the group, "A" is the uppermost; "": all rows. `Sheet.outfits`
+            lists those that show the same directions.
         matting: ONNX file of a network that takes the figures off their background: U2-Net and
             others that rembg can use.
 

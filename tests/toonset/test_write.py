@@ -156,6 +156,14 @@ def test_a_claim_lasts_as_long_as_the_command_and_may_be_repeated(tmp_path):
     assert names(tmp_path) == ["out"]
 
 
+def test_a_folder_within_a_new_one_leaves_no_lock_there(tmp_path):
+    with command(), new_folder(tmp_path / "out") as outer:
+        with new_folder(outer / "a") as inner:
+            (inner / "file").write_text("")
+        assert names(outer) == ["a"]
+    assert names(tmp_path / "out") == ["a"]
+
+
 def test_a_new_place_deeper_down_leaves_no_lock_above(tmp_path):
     with command():
         check_new_folder(tmp_path / "a" / "b" / "out")
