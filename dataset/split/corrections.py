@@ -20,6 +20,7 @@ from toonset.dataset.split.figures.blobs import (
     remove_strangers,
 )
 from toonset.dataset.split.figures.frames import find_frames, find_strokes
+from toonset.dataset.split.figures.grouping import SPECK
 from toonset.dataset.split.figures.open_outlines import LINE, Gap, close_outlines
 from toonset.dataset.split.figures.rows import Group, Taken, find_groups
 from toonset.dataset.split.figures.shadows import find_shadows
@@ -131,8 +132,11 @@ def fill_open_outlines(state: SheetState) -> SheetState | None:
     Where figures are painted, sketches beside them stay as they are, and what lies between two of
     them belongs to neither.
     """
-    filled, gaps = close_outlines(state.painted & ~state.ruled, state.paper, state.ring)
-    if gaps and _are_painted(state):
+    walls, painted = state.painted & ~state.ruled, _are_painted(state)
+    if painted:
+        walls &= ~_specks(state)
+    filled, gaps = close_outlines(walls, state.paper, state.ring)
+    if gaps and painted:
         own = np.zeros_like(filled)
         for number in state.main_blobs:
             own[state.blobs.window(int(number))] = True
@@ -141,6 +145,12 @@ def fill_open_outlines(state: SheetState) -> SheetState | None:
     if not gaps:
         return None
     return replace(state, filled=filled, gaps=gaps).with_paper()
+
+
+def _specks(state: SheetState) -> Bool[np.ndarray, "rows columns"]:
+    """Return the patches that are no piece of an outline: grain of the paper, spatter."""
+    height = float(np.median(state.blobs.boxes[state.main_blobs, 3]))
+    return np.append(False, state.blobs.areas <= (SPECK * height) ** 2)[state.blobs.labels]
 
 
 def _between(

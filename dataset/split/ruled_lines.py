@@ -8,6 +8,7 @@ letter is not a ruled line.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import cv2
 import numpy as np
@@ -91,6 +92,7 @@ def find_lines(paint: Bool[np.ndarray, "height width"]) -> list[Line]:
     ]
     closed = _closed(lines, free, JOINT * min(height, width) + thickest)
     shortest = LEAST_SIDE * min(height, width)
+    closed += _rectangles(paint, lines, shortest)
     return free + [
         line for line in closed if line not in free and line.stop - line.start >= shortest
     ]
@@ -317,6 +319,50 @@ def _closed(lines: list[Line], free: list[Line], slack: float) -> list[Line]:
         if len(left) == len(kept):
             return left
         kept = left
+
+
+def _rectangles(paint: np.ndarray, lines: list[Line], shortest: float) -> list[Line]:
+    """Return the sides of rectangles that go on wherever the figures before them leave paper."""
+    across = _levels([line for line in lines if not line.vertical], SHARED * paint.shape[1])
+    upright = _levels([line for line in lines if line.vertical], SHARED * paint.shape[0])
+    found = dict[Line, None]()
+    for left, right in combinations(upright, 2):
+        sides = [replace(line, start=left.first, stop=right.last + 1) for line in across]
+        sides = [line for line in sides if line.stop - line.start >= shortest]
+        for top, bottom in combinations([line for line in sides if _goes_on(paint, line)], 2):
+            ends = {"start": top.first, "stop": bottom.last + 1}
+            both = [replace(line, **ends) for line in (left, right)]
+            if ends["stop"] - ends["start"] >= shortest and all(
+                _goes_on(paint.T, line) for line in both
+            ):
+                found |= dict.fromkeys([top, bottom, *both])
+    return list(found)
+
+
+def _levels(lines: list[Line], least: float) -> list[Line]:
+    """Return the levels, in order, on which pieces of such a length lie."""
+    pieces = list[list[Line]]()
+    for line in sorted(lines, key=lambda line: line.start - line.stop):
+        own = next((own for own in pieces if _is_on(line, own[0])), None)
+        if own is None:
+            pieces.append([line])
+        else:
+            own.append(line)
+    return sorted(
+        (
+            replace(own[0], first=min(x.first for x in own), last=max(x.last for x in own))
+            for own in pieces
+            if sum(x.stop - x.start for x in own) >= least
+        ),
+        key=lambda line: line.first,
+    )
+
+
+def _goes_on(paint: np.ndarray, line: Line) -> bool:
+    """Return whether a line is drawn nearly wherever there is paper on both of its sides."""
+    open_, rows = _open(paint, line), paint[line.first : line.last + 1, line.start : line.stop]
+    drawn = rows.any(axis=0)[open_]
+    return bool(open_.mean() >= OPEN_ACROSS and drawn.mean() >= THROUGHOUT)
 
 
 def _is_joined(line: Line, others: list[Line], slack: float) -> bool:

@@ -32,8 +32,11 @@ FEET = 0.95  # of the figure's height from its top: no part's middle lies lower
 SAME_LEVEL = 0.08  # of the figure's height
 SAME_SIZE = 2.5  # times, of shares of the figure's area
 OFTEN = 0.45  # times the views: in some a hand lies before the body, in some there are two
+HAND = 0.06  # of the figure's area: a larger thing beside it is a drawing of its own
+TOUCHING = 0.01  # of the figure's height: unless it is as near as this
 PART_AREA = 0.35  # of the figure's area: a larger thing apart is a drawing of its own
 LEAST_PART = 0.004  # of the figure's area: smaller things beside a figure are marks
+SPECK = 0.01  # of the figure's height: the side of a patch that is dust if nothing is near
 LEAST_SPECK = 4  # cells: smaller things are noise
 LISTED_SPECK = 0.0005  # of the figure's area: smaller ones are counted, not listed
 FAMILIAR = 0.8  # of a part's pixels in colours that its figure has
@@ -93,9 +96,12 @@ def group_blobs(
         bodies = main_blobs[nearest]
         out = _off_level(blobs, small, bodies, _levels(blobs, main_blobs)[nearest])
         for i, number in enumerate(small):
-            within = _share_within(blobs.boxes[number], blobs.boxes[bodies[i]]) >= WITHIN
+            body, height = blobs.boxes[bodies[i]], blobs.boxes[bodies[i], 3]
+            near = gap[i] <= NEAR * height
+            within = near and _share_within(blobs.boxes[number], body) >= WITHIN
             in_row = (bool(letters[i] | swatches[i]) and not within) or bool(in_palette[i])
-            if in_row or out[i] > LEVEL or number in studies:
+            dust = gap[i] > TOUCHING * height and blobs.areas[number] <= (SPECK * height) ** 2
+            if in_row or dust or out[i] > LEVEL or number in studies:
                 continue
             if _is_part(blobs, int(number), int(bodies[i]), float(gap[i]), rgb):
                 figure[number] = nearest[i]
@@ -180,6 +186,9 @@ def _is_part(blobs: Blobs, number: int, body: int, gap: float, rgb: np.ndarray) 
         return True
     if blobs.areas[number] >= SWATCH * own[2] * own[3]:
         return False
+    aside = own[0] >= main[0] + main[2] or own[0] + own[2] <= main[0]
+    if aside and area > HAND and gap > TOUCHING * main[3]:
+        return False
     lettering = _is_lettering(blobs, number, body, rgb)
     below = own[1] >= main[1] + main[3]
     if gap <= NEAR * main[3]:
@@ -212,7 +221,8 @@ def _come_again(
     level = middle[:, 1] / main[:, 3]
     size = blobs.areas[numbers] / blobs.areas[bodies]
     above = (middle[:, 0] >= 0) & (middle[:, 0] <= main[:, 2])
-    able = (gaps <= FARTHEST * main[:, 3]) & (size >= LEAST_PART) & (size <= PART_AREA)
+    able = (gaps <= FARTHEST * main[:, 3]) & (size >= LEAST_PART)
+    able &= size <= np.where(above, PART_AREA, HAND)
     able &= level <= FEET  # captions stand below
     for i in np.flatnonzero(able):
         number, body = int(numbers[i]), int(bodies[i])
