@@ -47,7 +47,7 @@ def page_warnings(pages: Pages | None) -> tuple[str, ...]:
 
 def mark_warnings(mark: Watermark | None) -> tuple[str, ...]:
     """Return a line if a watermark lies over the figures: their colours may keep some of it."""
-    if mark is None:
+    if mark is None or not mark.over_figures:
         return ()
     return (
         "a watermark lies over the sheet; it was taken off the paper and flat colours: look at the "
