@@ -34,7 +34,7 @@ from toonset.dataset.split.warnings import (
     mark_warnings,
     page_warnings,
 )
-from toonset.dataset.split.watermark import find_watermark, remove_watermark
+from toonset.dataset.split.watermark import Watermark, find_watermark, remove_watermark
 from toonset.errors import SheetError
 from toonset.palette.palette import Hex
 from toonset.palette.pixels.enlarged import Grid, find_grid
@@ -201,7 +201,7 @@ def split_picture(
         + (() if by_hand else figure_warnings(found, views, rgba)),
         () if by_hand else _left_out(found),
         (
-            *_of_picture(pages, residual),
+            *_of_picture(pages, residual, mark),
             *_remarks(ground, found, holes, papered, 0 if by_hand else len(found.cuts)),
         ),
         swatches,
@@ -376,11 +376,13 @@ def _groups(found: SheetLayout) -> tuple[FigureGroup, ...]:
     return tuple(listed)
 
 
-def _of_picture(pages: Pages | None, residual: int) -> tuple[str, ...]:
-    """Return what was changed before the ground was looked for."""
+def _of_picture(pages: Pages | None, residual: int, mark: Watermark | None) -> tuple[str, ...]:
+    """Return what was changed before the figures were looked for."""
     said = [] if pages is None else [f"what lies around {pages} was left out"]
     if residual:
         said.append(f"alpha of up to {residual} of 255 was taken for transparent")
+    if mark is not None and not mark.over_figures:
+        said.append("a faint drawing behind the figures was taken off the paper")
     return tuple(said)
 
 

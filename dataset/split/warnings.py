@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 from jaxtyping import UInt8
 
-from toonset.dataset.split.background import SURE_ENOUGH, Background
+from toonset.dataset.split.background import SURE_ENOUGH, Background, ring_of
 from toonset.dataset.split.figures.blobs import Blobs, find_blobs, shared_colors
 from toonset.dataset.split.figures.grouping import LEAST_PART
 from toonset.dataset.split.figures.open_outlines import LINE, Gap
@@ -16,23 +17,31 @@ from toonset.dataset.split.watermark import Watermark
 from toonset.raster import dilate, sized_parts, wider_than
 from toonset.view import View
 
+REACHING = 0.1  # of the sheet's border: so much may be figures that reach over its edge
 NEARLY_A_VIEW = 0.5  # of the views' height: something left out that may be a small one
 PROPORTIONS = 1.2  # times the widest view's, or less than its inverse of the narrowest's: no view
 ALIKE = 0.6  # of the colours that the views share among each other: less is another thing
 BROAD = 1.15  # times its own height: wider than arms reach
 NEARER = 1.2  # times the gap between parts and their bodies: so near a part may be another's
+OFF_ROW = 0.05  # of its height: the views of a row stand on one line
+LIKE_SIZED = 1.5  # times the height: a pair of parts
 AS_LIKELY = 0.6  # of the merit of the group that was taken: another may be the turnaround
 WHOLE = 0.6  # of the sheet that one view's box covers though there is text beside it
 WIDE_GAP = 0.05  # of the figure's height: a wider gap may be meant
 LARGE_POCKET = 0.01  # of the figure's squared height: so much more or less changes it
 FULL = 0.82  # of its box: no figure fills more
 MOST_STROKES = 0.08  # of a view: with more it is hollow somewhere
+NO_OUTLINE = ("text", "swatch")  # no gap is between a figure and these
 STROKES = ("mark", "speck", "text")  # as which pieces of a pencil drawing are left out
 BROKEN = 0.05  # of the views' height: gaps between its pieces
-PIECES = 3  # no sword or ruler has more
+PIECES = 2  # no sword or ruler has more
+CRUMB = 0.01  # of the largest piece: a smaller one is dust beside it
 LEVEL = 0.7  # of their height: beside a view they stand in its row
 SLENDER = 0.12  # of its height: a drawing is no narrower
 WIDE = 1.28  # times the next widest of four or more: two figures, or a study that touches
+LIMB = 0.12  # of the figure's height: what is no wider is an arm, a scarf or a tail
+BROADER = 1.05  # times the next broadest without those: spread arms alone are a pose
+LOOKED_AT = 200  # pixels: height of the copy of which limbs are taken off
 
 
 def page_warnings(pages: Pages | None) -> tuple[str, ...]:
@@ -47,7 +56,7 @@ def page_warnings(pages: Pages | None) -> tuple[str, ...]:
 
 def mark_warnings(mark: Watermark | None) -> tuple[str, ...]:
     """Return a line if a watermark lies over the figures: their colours may keep some of it."""
-    if mark is None:
+    if mark is None or not mark.over_figures:
         return ()
     return (
         "a watermark lies over the sheet; it was taken off the paper and flat colours: look at the "
@@ -56,8 +65,17 @@ def mark_warnings(mark: Watermark | None) -> tuple[str, ...]:
 
 
 def border_warnings(ground: Background, found: SheetLayout) -> tuple[str, ...]:
-    """Return a line if the background is hardly one."""
-    if ground.rgb is None or ground.sure >= SURE_ENOUGH or found.lines:  # a frame explains it
+    """Return a line if the background is hardly one.
+
+    Frames explain a border that is not background, and so do figures that reach over the sheet's
+    edge, but for a little of it: a backdrop that was taken for a figure reaches it, too.
+    """
+    if ground.rgb is None or ground.sure >= SURE_ENOUGH or found.lines:
+        return ()
+    figures = figure_cells(found) > 0
+    rows, columns = figures.shape
+    reaching = float(figures[ring_of(rows, columns, ground.inset)].mean())
+    if found.grouping.count > 1 and ground.sure + min(reaching, REACHING) >= SURE_ENOUGH:
         return ()
     return (f"only {100 * ground.sure:.0f} % of the sheet's border is background",)
 
@@ -70,6 +88,7 @@ def figure_warnings(
         *_cuts(found),
         *_open_outlines(found, views),
         *_wide_views(views),
+        *_off_row(views),
         *_whole_page(found, views, rgba),
         *_panels(views, rgba),
         *_near_parts(found, views),
@@ -96,7 +115,9 @@ def _open_outlines(found: SheetLayout, views: list[View]) -> list[str]:
     said, number, cell = list[str](), figure_cells(found), found.cell_px
     for figure, view in enumerate(views):
         own = [
-            gap for gap in found.gaps if _is_worth_a_word(gap) and _is_beside(number, gap, figure)
+            gap
+            for gap in found.gaps
+            if _is_worth_a_word(gap) and _is_beside(found, number, gap, figure)
         ]
         where = f"the outline of {view.name} is open at"
         if own:
@@ -113,11 +134,19 @@ def _is_worth_a_word(gap: Gap) -> bool:
     return far or not gap.closed
 
 
-def _is_beside(number: np.ndarray, gap: Gap, figure: int) -> bool:
+def _is_beside(found: SheetLayout, number: np.ndarray, gap: Gap, figure: int) -> bool:
+    """Return whether a gap is in a figure's outline, not between it and text or swatches."""
     reach = max(2, round(gap.width))
-    rows = slice(max(gap.y - reach, 0), gap.y + reach + 1)
-    columns = slice(max(gap.x - reach, 0), gap.x + reach + 1)
-    return bool((number[rows, columns] == figure + 1).any())
+    top, left = max(gap.y - reach, 0), max(gap.x - reach, 0)
+    window = slice(top, gap.y + reach + 1), slice(left, gap.x + reach + 1)
+    rows, columns = np.nonzero(number[window] == figure + 1)
+    if not len(rows):
+        return False
+    kinds = np.isin(np.array(["text", *found.grouping.kinds], dtype=object), NO_OUTLINE)
+    drawn = np.argwhere(~kinds[found.blobs.labels[window]]) - (gap.y - top, gap.x - left)
+    own = np.stack([rows, columns], axis=1) - (gap.y - top, gap.x - left)
+    nearest = own[(own**2).sum(axis=1).argmin()]
+    return bool((drawn @ nearest < 0).any())
 
 
 def _strokes(view: View) -> tuple[int, int] | None:
@@ -132,12 +161,50 @@ def _strokes(view: View) -> tuple[int, int] | None:
 
 
 def _wide_views(views: list[View]) -> list[str]:
-    said = []
+    """Return a line for every view as wide as two figures, or as one and a study.
+
+    Wider than the other views counts only without arms, scarves and tails, which may be spread.
+    """
+    said, bodies = [], list[float]()
     widths = [view.figure_box[2] / view.figure_box[3] for view in views]
     most = WIDE * sorted(widths)[-2] if len(views) > 3 else BROAD
-    for view, width in zip(views, widths, strict=True):
-        if width > min(most, BROAD):
-            said.append(f"view {view.name} is unusually wide: do two figures touch?")
+    for number, width in enumerate(widths):
+        if width <= min(most, BROAD):
+            continue
+        bodies = bodies or [_body_width(view) for view in views]
+        others = bodies[:number] + bodies[number + 1 :]
+        if width > BROAD or bodies[number] > BROADER * max(others):
+            said.append(f"view {views[number].name} is unusually wide: do two figures touch?")
+    return said
+
+
+def _body_width(view: View) -> float:
+    """Return how wide a figure is without its limbs, in its heights."""
+    left, top, width, height = view.figure_box
+    x, y = left - view.box[0], top - view.box[1]
+    size = max(1, round(width * LOOKED_AT / height)), LOOKED_AT
+    figure = view.mask[y : y + height, x : x + width].view(np.uint8)
+    small = cv2.resize(255 * figure, size, interpolation=cv2.INTER_AREA) >= 128
+    columns = np.flatnonzero(wider_than(small, round(LIMB / 2 * LOOKED_AT)).any(axis=0))
+    return float(columns[-1] - columns[0] + 1) / LOOKED_AT if len(columns) else 0.0
+
+
+def _off_row(views: list[View]) -> list[str]:
+    """Return a line for every view whose head and feet are both higher or lower than its row's."""
+    said = []
+    for view in views:
+        _, top, _, height = view.figure_box
+        row = [
+            (other.figure_box[1] - top, other.figure_box[1] + other.figure_box[3] - top - height)
+            for other in views
+            if other is not view and _is_level(top, height, other)
+        ]
+        heads, feet = np.median(row, axis=0) / height if len(row) > 1 else (0.0, 0.0)
+        if min(abs(heads), abs(feet)) > OFF_ROW and heads * feet > 0:
+            said.append(
+                f"view {view.name} stands {'lower' if heads < 0 else 'higher'} than the rest of "
+                "its row: is it another drawing?"
+            )
     return said
 
 
@@ -165,20 +232,56 @@ def _panels(views: list[View], rgba: np.ndarray) -> list[str]:
 
 
 def _near_parts(found: SheetLayout, views: list[View]) -> list[str]:
-    """Return a line for every part apart that stands as near to another view as parts do."""
+    """Return a line for every part apart that stands as near to another view as parts do.
+
+    Not where it is one of a pair, or where the other view has its own between that and its body.
+    """
     parts, bodies = _parts_apart(found)
     own = [_gap(found.blobs, n, bodies[k]) for n, k in parts]
     reach = NEARER * max((gap for gap in own if np.isfinite(gap)), default=0.0)
     said = []
     for (number, figure), gap in zip(parts, own, strict=True):
+        alike = [(n, k) for n, k in parts if n != number and _is_like(found.blobs, number, n)]
         for other, body in enumerate(bodies):
-            if other != figure and np.isfinite(gap) and _gap(found.blobs, number, body) <= reach:
+            away = _gap(found.blobs, number, body)
+            if other == figure or not np.isfinite(gap) or away > reach:
+                continue
+            paired = gap <= away and _is_paired(
+                found.blobs, number, [n for n, k in alike if k == figure], bodies[figure]
+            )
+            theirs = [n for n, k in alike if k == other]
+            if not paired and not _is_one_between(found.blobs, number, theirs, body):
                 x, y, _, _ = (int(value) * found.cell_px for value in found.blobs.boxes[number])
                 said.append(
                     f"a part at {x}, {y} went to view {views[figure].name}: "
                     f"is it a part of {views[other].name}, which is near, too?"
                 )
     return said
+
+
+def _is_like(blobs: Blobs, part: int, other: int) -> bool:
+    """Return whether two parts are about equally high and at one level, as two hands are."""
+    (_, y, _, height), (_, top, _, tall) = blobs.boxes[part], blobs.boxes[other]
+    level = min(y + height, top + tall) - max(y, top) >= LEVEL * min(height, tall)
+    return bool(level and max(height, tall) <= LIKE_SIZED * min(height, tall))
+
+
+def _middle(blobs: Blobs, number: int) -> float:
+    return float(blobs.boxes[number, 0] + blobs.boxes[number, 2] / 2)
+
+
+def _is_paired(blobs: Blobs, part: int, alike: list[int], body: int) -> bool:
+    """Return whether a body has one part on each side, of which this is one."""
+    middle = _middle(blobs, body)
+    left = _middle(blobs, part) < middle
+    beside = [(_middle(blobs, other) < middle) == left for other in alike]
+    return len(beside) > 0 and not any(beside)
+
+
+def _is_one_between(blobs: Blobs, part: int, theirs: list[int], body: int) -> bool:
+    """Return whether one of a view's own parts lies between another's part and its body."""
+    ends = sorted((_middle(blobs, part), _middle(blobs, body)))
+    return any(ends[0] < _middle(blobs, number) < ends[1] for number in theirs)
 
 
 def _parts_apart(found: SheetLayout) -> tuple[list[tuple[int, int]], list[int]]:
@@ -262,7 +365,9 @@ def _scattered_strokes(found: SheetLayout, views: list[View]) -> list[str]:
             continue
         if not any(_is_level((y + reach) * cell, tall * cell, view) for view in views):
             continue
-        if len(np.unique(found.blobs.labels[together.labels == number + 1])) > PIECES:
+        inside = found.blobs.labels[(together.labels == number + 1) & strokes]
+        pieces = np.bincount(inside)
+        if np.count_nonzero(pieces > CRUMB * pieces.max()) > PIECES:
             x, y = (x + reach) * cell, (y + reach) * cell
             said.append(
                 f"strokes at {x}, {y} lie together {100 * tall / usual:.0f} % as high as the "

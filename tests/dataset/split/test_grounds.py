@@ -15,6 +15,7 @@ from toonset.dataset.split.background import remove_residual_alpha, ring_of
 from toonset.dataset.split.background_zones import find_zones, fit_steps
 from toonset.dataset.split.pages import find_pages, straightened
 from toonset.dataset.split.sheet import Segmentation, split_picture
+from toonset.dataset.split.watermark import find_watermark
 from toonset.dataset.split_folder.load import split_sheet
 
 WIDTH, HEIGHT, FIGURES = 800, 260, 4
@@ -324,16 +325,21 @@ def test_soft_edges_and_glows_keep_their_alpha() -> None:
     assert cleaned is rgba
 
 
-@pytest.mark.parametrize(("color", "opacity"), [((0, 0, 0), 0.15), ((120, 120, 120), 0.25)])
-def test_a_watermark_is_taken_off_and_told(color: tuple[int, int, int], opacity: float) -> None:
-    picture, truth = figures(plain(255))
+def samples() -> np.ndarray:
+    """Return the coverage of a word that is repeated all over, at an angle."""
     letters = np.zeros((1000, 1400), np.uint8)
     for j, y in enumerate(range(30, 1000, 70)):
         for x in range(-60 * (j % 3), 1400, 200):
             cv2.putText(letters, "SAMPLE", (x, y), 0, 1, 255, 2, cv2.LINE_AA)
     turn = cv2.getRotationMatrix2D((700, 500), 20, 1)
     turned = cv2.warpAffine(letters, turn, (1400, 1000))[370 : 370 + HEIGHT, 300 : 300 + WIDTH]
-    share = opacity * turned[..., None] / 255
+    return np.asarray(turned[..., None] / 255)
+
+
+@pytest.mark.parametrize(("color", "opacity"), [((0, 0, 0), 0.15), ((120, 120, 120), 0.25)])
+def test_a_watermark_is_taken_off_and_told(color: tuple[int, int, int], opacity: float) -> None:
+    picture, truth = figures(plain(255))
+    share = opacity * samples()
     marked = (picture * (1 - share) + np.array(color) * share).astype(np.uint8)
     found = assert_right(opaque(marked), truth)
     assert any("watermark" in line for line in found.warnings)
@@ -342,6 +348,31 @@ def test_a_watermark_is_taken_off_and_told(color: tuple[int, int, int], opacity:
         clean = picture[y : y + height, x : x + width].astype(int)
         off = np.abs(view.rgba[..., :3] - clean).max(axis=2)[view.mask]
         assert np.mean(off > 12) < 0.03  # letters cover about a sixth
+
+
+@pytest.mark.parametrize(("color", "opacity"), [((0, 0, 0), 0.15), ((120, 120, 120), 0.25)])
+def test_letters_behind_the_figures_are_no_watermark(
+    color: tuple[int, int, int], opacity: float
+) -> None:
+    picture, truth = figures(plain(255))
+    share = np.where(truth[..., None], 0, opacity * samples())
+    sheet = (picture * (1 - share) + np.array(color) * share).astype(np.uint8)
+    found = assert_right(opaque(sheet), truth)
+    assert not found.warnings
+    assert any("behind the figures" in line for line in found.remarks)
+    for view in found.views:
+        x, y, width, height = view.box
+        off = np.abs(view.rgba[..., :3] - picture[y : y + height, x : x + width].astype(int))
+        assert (
+            np.mean(off.max(axis=2)[view.mask & truth[y : y + height, x : x + width]] > 12) < 0.01
+        )
+
+
+def test_what_covers_most_of_the_paper_is_no_watermark() -> None:
+    light = (ROWS % 30 > 4) & ((COLUMNS + 17 * (ROWS // 30)) % 46 > 4)  # on paper with a dark rim
+    picture, _ = figures(np.where(light[..., None], (238, 229, 213), (230, 218, 197)).astype("u1"))
+    assert light.mean() > 0.7
+    assert find_watermark(picture, (230, 218, 197)) is None
 
 
 def test_zones_end_at_edges() -> None:

@@ -1,11 +1,17 @@
 """What is left out is doubted if it may be a view, and not if it is a head or a sword."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
 
 from bench.messy.sheet import make_messy_sheet
+from toonset.dataset.split.background import find_background
+from toonset.dataset.split.figures.rows import LIKELIEST
+from toonset.dataset.split.segment import find_layout, find_paint
 from toonset.dataset.split.sheet import split_picture
+from toonset.dataset.split.warnings import border_warnings
 
 
 def figure(height: int, shirt: tuple[int, int, int]) -> np.ndarray:
@@ -80,3 +86,66 @@ def test_pieces_of_a_pencil_drawing_that_were_left_out_are_doubted() -> None:
     sheet = split_picture(page)
     assert len(sheet.views) == 3
     assert any("strokes at" in line for line in sheet.warnings)
+
+
+def with_arms(page: np.ndarray, x: int, thickness: int) -> np.ndarray:
+    """Return a sheet on which the figure from x on has its arms spread, 30 px beyond its box."""
+    result = page.copy()
+    result[120 : 120 + thickness, x - 26 : x + 138, :3] = (200, 40, 40)
+    return result
+
+
+@pytest.mark.parametrize(("thickness", "doubted"), [(16, False), (90, True)])
+def test_spread_arms_are_no_second_figure(thickness: int, doubted: bool) -> None:
+    page = sheet_of(*[figure(280, (200, 40, 40)) for _ in range(4)])
+    sheet = split_picture(with_arms(page, 40 + 172, thickness))
+    assert len(sheet.views) == 4
+    assert any("unusually wide" in line for line in sheet.warnings) == doubted
+
+
+@pytest.mark.parametrize(("lift", "doubted"), [(0, False), (40, True)])
+def test_a_view_off_its_row_is_doubted(lift: int, doubted: bool) -> None:
+    page = sheet_of(*[figure(240, (200, 40, 40)) for _ in range(4)])
+    last = page[:, -140:].copy()
+    page[:, -140:] = 255
+    page[: 340 - lift, -140:] = last[lift:]
+    sheet = split_picture(page)
+    assert len(sheet.views) == 4
+    assert any("higher than the rest of its row" in line for line in sheet.warnings) == doubted
+
+
+def test_a_sword_with_dust_beside_it_is_no_broken_drawing() -> None:
+    page = sheet_of(*[figure(280, (200, 40, 40)) for _ in range(3)], figure(280, (255, 255, 255)))
+    x = page.shape[1] - 120
+    cv2.line(page, (x, 60), (x + 50, 300), (90, 90, 90, 255), 3)
+    cv2.line(page, (x, 110), (x + 40, 100), (90, 90, 90, 255), 3)
+    for y in range(150, 250, 20):
+        page[y, x + (y - 60) * 50 // 240 + 5, :3] = 90
+    assert not split_picture(page).warnings
+
+
+def test_hands_apart_are_those_of_the_figure_with_one_on_each_side() -> None:
+    page = np.full((340, 640, 4), 255, np.uint8)
+    for x in (80, 300, 460):
+        page[20:320, x : x + 112, :3] = np.pad(
+            figure(280, (200, 40, 40)), ((20, 0), (0, 0), (0, 0)), constant_values=255
+        )
+    for x in (26, 232, 280, 418):  # the last one hides its own
+        page[180:196, x : x + 14, :3] = (230, 190, 160)
+    sheet = split_picture(page)
+    assert len(sheet.views) == 3
+    assert not sheet.warnings
+
+
+@pytest.mark.parametrize(
+    ("reaching", "sure", "doubted"), [(True, 0.84, False), (True, 0.75, True), (False, 0.84, True)]
+)
+def test_figures_over_the_edge_explain_a_little_of_the_border(
+    reaching: bool, sure: float, doubted: bool
+) -> None:
+    page = sheet_of(*[figure(280, (200, 40, 40)) for _ in range(3)])
+    if reaching:
+        page = page[:300]
+    paint, ground = find_paint(page, find_background(page))
+    found = find_layout(page, paint, ground, (), LIKELIEST)
+    assert bool(border_warnings(replace(ground, sure=sure), found)) == doubted
