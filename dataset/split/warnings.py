@@ -10,7 +10,7 @@ from toonset.dataset.split.background import SURE_ENOUGH, Background, ring_of
 from toonset.dataset.split.figures.blobs import Blobs, find_blobs, shared_colors
 from toonset.dataset.split.figures.grouping import LEAST_PART
 from toonset.dataset.split.figures.open_outlines import LINE, Gap
-from toonset.dataset.split.figures.rows import LOWEST
+from toonset.dataset.split.figures.rows import LOWEST, OFF_ROW
 from toonset.dataset.split.pages import Pages
 from toonset.dataset.split.segment import SheetLayout, figure_cells
 from toonset.dataset.split.watermark import Watermark
@@ -23,7 +23,6 @@ PROPORTIONS = 1.2  # times the widest view's, or less than its inverse of the na
 ALIKE = 0.6  # of the colours that the views share among each other: less is another thing
 BROAD = 1.15  # times its own height: wider than arms reach
 NEARER = 1.2  # times the gap between parts and their bodies: so near a part may be another's
-OFF_ROW = 0.05  # of its height: the views of a row stand on one line
 LIKE_SIZED = 1.5  # times the height: a pair of parts
 AS_LIKELY = 0.6  # of the merit of the group that was taken: another may be the turnaround
 WHOLE = 0.6  # of the sheet that one view's box covers though there is text beside it
@@ -194,18 +193,26 @@ def _off_row(views: list[View]) -> list[str]:
     said = []
     for view in views:
         _, top, _, height = view.figure_box
-        row = [
-            (other.figure_box[1] - top, other.figure_box[1] + other.figure_box[3] - top - height)
-            for other in views
-            if other is not view and _is_level(top, height, other)
-        ]
-        heads, feet = np.median(row, axis=0) / height if len(row) > 1 else (0.0, 0.0)
+        heads, feet = _beside_row(top, height, [other for other in views if other is not view])
         if min(abs(heads), abs(feet)) > OFF_ROW and heads * feet > 0:
             said.append(
                 f"view {view.name} stands {'lower' if heads < 0 else 'higher'} than the rest of "
                 "its row: is it another drawing?"
             )
     return said
+
+
+def _beside_row(top: int, height: int, views: list[View]) -> tuple[float, float]:
+    """Return how far something's row has its heads and its feet below its own, in its height."""
+    row = [
+        (view.figure_box[1] - top, view.figure_box[1] + view.figure_box[3] - top - height)
+        for view in views
+        if _is_level(top, height, view)
+    ]
+    if len(row) < 2:
+        return 0.0, 0.0
+    heads, feet = np.median(row, axis=0) / height
+    return float(heads), float(feet)
 
 
 def _whole_page(found: SheetLayout, views: list[View], rgba: np.ndarray) -> list[str]:
@@ -325,7 +332,8 @@ def _other_groups(found: SheetLayout) -> list[str]:
 def _like_views(found: SheetLayout, views: list[View], rgba: np.ndarray) -> list[str]:
     """Return a line for every drawing left out that is as high as a view, or like a small one.
 
-    Drawings of another row of equal figures are poses or busts, which the row says.
+    Drawings of another row of equal figures are poses or busts, which the row says, and so are
+    those beside the views that do not stand in their row.
     """
     rows = [row for group in found.groups for row in group.rows if len(row) > 1]
     in_rows = set(np.concatenate([np.zeros(0, int), *rows]).tolist())
@@ -337,7 +345,8 @@ def _like_views(found: SheetLayout, views: list[View], rgba: np.ndarray) -> list
         if kind != "study" or number in in_rows:
             continue
         x, y, width, height = (int(value) * cell for value in found.blobs.boxes[number])
-        if height < NEARLY_A_VIEW * usual:
+        strays = min(map(abs, _beside_row(y, height, views))) > OFF_ROW
+        if height < NEARLY_A_VIEW * usual or strays:
             continue
         own = rgba[::cell, ::cell, :3][found.blobs.window(number)][found.blobs.mask(number)]
         slender = width / height >= min(shapes) / PROPORTIONS

@@ -21,6 +21,8 @@ from toonset.dataset.split.figures.text_and_swatches import find_letters
 LOWEST = 0.75  # of the group's median height: lower drawings are studies or props
 HIGHEST = 1.45  # of the same: higher ones, too
 LARGE = 0.02  # of the largest patch's area: smaller things make no group
+OFF_ROW = 0.05  # of their height: the figures of a row stand on one line
+LEAST_ROW = 3  # figures on one line: they make a row
 AS_HIGH = 0.88  # of a row's height: another row that is lower is no part of its group
 MOST_COUNTED = 4  # figures of a group: more speak no more for a turnaround
 ALONE = 0.5  # likeness of a figure alone, to set beside that of figures in a row
@@ -94,21 +96,21 @@ def find_groups(blobs: Blobs) -> tuple[Group, ...]:
     if not len(candidates):
         return ()
     rows = [
-        part
-        for row in rows_of(blobs.boxes[candidates], blobs.centers[candidates])
+        (number, part)
+        for number, row in enumerate(rows_of(blobs.boxes[candidates], blobs.centers[candidates]))
         for part in _of_one_height(blobs, candidates[row])
     ]
-    joined = list[list[np.ndarray]]()
-    for row in sorted(rows, key=lambda row: -_weight(blobs, row)):
+    joined = list[dict[int, np.ndarray]]()  # parts of one row are apart for a reason
+    for number, row in sorted(rows, key=lambda row: -_weight(blobs, row[1])):
         height = float(np.median(blobs.boxes[row, 3]))
         for others in joined:
-            first = float(np.median(blobs.boxes[others[0], 3]))
-            if AS_HIGH <= height / first <= 1 / AS_HIGH:
-                others.append(row)
+            first = float(np.median(blobs.boxes[next(iter(others.values())), 3]))
+            if number not in others and AS_HIGH <= height / first <= 1 / AS_HIGH:
+                others[number] = row
                 break
         else:
-            joined.append([row])
-    groups = [_group(blobs, rows, alone=len(joined) == 1) for rows in joined]
+            joined.append({number: row})
+    groups = [_group(blobs, [*rows.values()], alone=len(joined) == 1) for rows in joined]
     likeliest, *rest = sorted(groups, key=lambda group: -group.merit)
     return (likeliest, *sorted(rest, key=lambda group: len(group.members) == 1))
 
@@ -142,9 +144,30 @@ def _of_one_height(blobs: Blobs, row: Int[np.ndarray, " row"]) -> list[Int[np.nd
             weight = _weight(blobs, rest[alike])
             if weight > most:
                 best, most = alike, weight
+        best[best] = ~_strays(blobs, rest[best])
         parts.append(rest[best])
         rest = rest[~best]
     return parts
+
+
+def _strays(blobs: Blobs, row: Int[np.ndarray, " row"]) -> Bool[np.ndarray, " row"]:
+    """Return which patches of a row neither stand in line with most of it nor look like it."""
+    none = np.zeros(len(row), dtype=bool)
+    if not LEAST_ROW < len(row) <= MOST_COMPARED:
+        return none
+    height = np.median(blobs.boxes[row, 3])
+    ends = np.stack([blobs.boxes[row, 1], blobs.boxes[row, 1] + blobs.boxes[row, 3]], axis=1)
+    away = np.abs(ends[:, None] - ends) / height
+    level = (away.max(axis=2) <= OFF_ROW).sum(axis=1).argmax()
+    standing = away[level].max(axis=1) <= OFF_ROW
+    off = away[level].min(axis=1) > OFF_ROW
+    if standing.sum() < LEAST_ROW or not off.any():
+        return none
+    outlines = [_outline(blobs, int(number)) for number in row]
+    usual = _likeness([outlines[i] for i in np.flatnonzero(standing)]).min()
+    for i in np.flatnonzero(off):
+        none[i] = max(_alike(outlines[i], outlines[j]) for j in np.flatnonzero(standing)) < usual
+    return none
 
 
 def _weight(blobs: Blobs, row: Int[np.ndarray, " row"]) -> float:
@@ -199,9 +222,14 @@ def _likeness(outlines: list[np.ndarray]) -> Float[np.ndarray, " figures"]:
     """Return per outline its best overlap with another one, mirrored or not."""
     found = np.zeros(len(outlines))
     for i, j in combinations(range(len(outlines)), 2):
-        both = max(_overlap(outlines[i], other) for other in (outlines[j], outlines[j][:, ::-1]))
+        both = _alike(outlines[i], outlines[j])
         found[i], found[j] = max(found[i], both), max(found[j], both)
     return found
+
+
+def _alike(a: Bool[np.ndarray, "rows _"], b: Bool[np.ndarray, "rows _"]) -> float:
+    """Return how well two outlines cover each other, mirrored or not."""
+    return max(_overlap(a, b), _overlap(a, b[:, ::-1]))
 
 
 def _overlap(a: Bool[np.ndarray, "rows _"], b: Bool[np.ndarray, "rows _"]) -> float:
