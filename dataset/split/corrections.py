@@ -20,7 +20,7 @@ from toonset.dataset.split.figures.blobs import (
     remove_strangers,
 )
 from toonset.dataset.split.figures.frames import find_frames, find_strokes
-from toonset.dataset.split.figures.grouping import SPECK
+from toonset.dataset.split.figures.grouping import HAND, SPECK
 from toonset.dataset.split.figures.open_outlines import LINE, Gap, close_outlines
 from toonset.dataset.split.figures.rows import Group, Taken, find_groups
 from toonset.dataset.split.figures.shadows import find_shadows
@@ -156,12 +156,13 @@ def _specks(state: SheetState) -> Bool[np.ndarray, "rows columns"]:
 def _between(
     state: SheetState, filled: Bool[np.ndarray, "rows columns"]
 ) -> Bool[np.ndarray, "rows columns"]:
-    """Return the filled patches that touch two figures."""
+    """Return the filled patches that touch two figures, or one and a drawing of its own."""
     patches = parts(filled)
     touched = np.zeros(int(patches.max(initial=0)) + 1, dtype=int)
-    for number in state.main_blobs:
-        body = dilate(state.blobs.labels == number + 1, 1)
-        touched[np.unique(patches[body])] += 1
+    least = HAND * np.median(state.blobs.areas[state.main_blobs])
+    for number in np.flatnonzero(state.blobs.areas > least):
+        drawing = dilate(state.blobs.labels == number + 1, 1)
+        touched[np.unique(patches[drawing])] += 1
     touched[0] = 0
     return np.asarray(touched[patches] > 1)
 

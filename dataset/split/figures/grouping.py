@@ -186,8 +186,9 @@ def _is_part(blobs: Blobs, number: int, body: int, gap: float, rgb: np.ndarray) 
         return True
     if blobs.areas[number] >= SWATCH * own[2] * own[3]:
         return False
-    aside = own[0] >= main[0] + main[2] or own[0] + own[2] <= main[0]
-    if aside and area > HAND and gap > TOUCHING * main[3]:
+    middle = own[0] + own[2] / 2
+    above = main[0] <= middle <= main[0] + main[2]
+    if not above and area > HAND and gap > TOUCHING * main[3]:
         return False
     lettering = _is_lettering(blobs, number, body, rgb)
     below = own[1] >= main[1] + main[3]
@@ -197,8 +198,7 @@ def _is_part(blobs: Blobs, number: int, body: int, gap: float, rgb: np.ndarray) 
         return False
     if lettering:
         return False
-    middle = own[0] + own[2] / 2
-    if main[0] <= middle <= main[0] + main[2]:
+    if above:
         return bool(gap <= ABOVE * main[3] and own[1] < main[1])
     return gap <= BESIDE * main[3] and _in_its_colors(blobs, number, body, rgb)
 
