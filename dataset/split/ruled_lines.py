@@ -171,16 +171,19 @@ def _broken(paint: np.ndarray, lines: list[Line]) -> list[Line]:
     side = paint.shape[1]
     across = [line for line in lines if line.stop - line.start >= CROSSING * side]
     whole = [line for line in across if _is_open(paint, line)]
-    for first in sorted({line.first for line in lines}):
-        own = [line for line in lines if line.first == first]
-        last, vertical = max(line.last for line in own), own[0].vertical
-        length = sum(line.stop - line.start for line in own)
+    levels = dict[int, list[Line]]()
+    for line in lines:
+        levels.setdefault(line.first, []).append(line)
+    for first, own in sorted(levels.items(), key=lambda level: (-_length(level[1]), level[0])):
+        last, vertical, length = max(line.last for line in own), own[0].vertical, _length(own)
         line = Line(first, last, min(x.start for x in own), max(x.stop for x in own), vertical)
         level = _level(paint, line, lines)
-        apart = (other for other in whole if abs(other.first - first) > LEAST_RUN_PX)
-        if any(_ends_with(level, other) for other in apart):
-            if not any(_is_on(level, other) for other in (*found, *whole)):
-                found.append(level)
+        apart = [other for other in whole if abs(other.first - first) > LEAST_RUN_PX]
+        if sum(_ends_with(level, other) for other in apart) > 1:  # a frame has one other side
+            line = level
+            there = [*found, *(other for other in whole if _ends_with(line, other))]
+            if not any(_is_on(line, other) for other in there):
+                found.append(line)
         elif len(own) > 1 and length >= (UPRIGHT if vertical else SHARED) * side:
             open_, rows = _open(paint, line), paint[first : last + 1, line.start : line.stop]
             if open_.any() and rows.all(axis=0)[open_].mean() >= THROUGHOUT:
@@ -188,6 +191,10 @@ def _broken(paint: np.ndarray, lines: list[Line]) -> list[Line]:
         if line in found and (vertical or length >= CROSSING * side):
             long.append(line)
     return [line for line in found if line in long or _has_equals(line, found, SHARED * side)]
+
+
+def _length(pieces: list[Line]) -> int:
+    return sum(line.stop - line.start for line in pieces)
 
 
 def _level(paint: np.ndarray, line: Line, lines: list[Line]) -> Line:
@@ -352,7 +359,7 @@ def _levels(lines: list[Line], least: float) -> list[Line]:
         (
             replace(own[0], first=min(x.first for x in own), last=max(x.last for x in own))
             for own in pieces
-            if sum(x.stop - x.start for x in own) >= least
+            if _length(own) >= least
         ),
         key=lambda line: line.first,
     )
@@ -361,7 +368,7 @@ def _levels(lines: list[Line], least: float) -> list[Line]:
 def _goes_on(paint: np.ndarray, line: Line) -> bool:
     """Return whether a line is drawn nearly wherever there is paper on both of its sides."""
     open_, rows = _open(paint, line), paint[line.first : line.last + 1, line.start : line.stop]
-    drawn = rows.any(axis=0)[open_]
+    drawn = rows.all(axis=0)[open_]  # a line drawn by hand leaves its level
     return bool(open_.mean() >= OPEN_ACROSS and drawn.mean() >= THROUGHOUT)
 
 

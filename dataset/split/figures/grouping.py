@@ -23,6 +23,7 @@ from toonset.dataset.split.figures.printed_palette import (
 from toonset.dataset.split.figures.text_and_swatches import find_letters, find_swatches
 
 WITHIN = 0.5  # of a patch that lies in a figure's box: its part
+ASIDE = 0.3  # of the same: with less it stands beside the figure
 NEAR = 0.02  # of the figure's height: a part this near to the figure is the figure's
 ABOVE = 0.08  # of the figure's height: so near something above may be its part
 BESIDE = 0.08  # of the figure's height: so near something beside it may be, in its colours
@@ -183,12 +184,14 @@ def _is_part(blobs: Blobs, number: int, body: int, gap: float, rgb: np.ndarray) 
     if area > PART_AREA:
         return False
     if _share_within(own, main) >= WITHIN:
-        return True
+        near, large = gap <= NEAR * main[3], area >= LEAST_PART
+        return bool(near or (large and gap <= BESIDE * main[3]))
     if blobs.areas[number] >= SWATCH * own[2] * own[3]:
         return False
     middle = own[0] + own[2] / 2
     above = main[0] <= middle <= main[0] + main[2]
-    if not above and area > HAND and gap > TOUCHING * main[3]:
+    aside = _share_within(own, main) < ASIDE
+    if aside and not above and area > HAND and gap > TOUCHING * main[3]:
         return False
     lettering = _is_lettering(blobs, number, body, rgb)
     below = own[1] >= main[1] + main[3]

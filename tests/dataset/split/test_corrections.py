@@ -9,11 +9,13 @@ from toonset.errors import SheetError
 
 
 @pytest.mark.parametrize(
-    ("difficulty", "correction"),
-    [("shadows", "shadows"), ("touching", "touching figures"), ("hand frame", "frames")],
+    ("difficulty", "seed", "correction"),
+    [("shadows", 0, "shadows"), ("touching", 0, "touching figures"), ("hand frame", 4, "frames")],
 )
-def test_a_sheet_that_needs_a_correction_misses_it(difficulty: str, correction: str) -> None:
-    sheet = make_messy_sheet(0, [difficulty])
+def test_a_sheet_that_needs_a_correction_misses_it(
+    difficulty: str, seed: int, correction: str
+) -> None:
+    sheet = make_messy_sheet(seed, [difficulty])
     boxes = [view.box for view in split_picture(sheet.rgba).views]
     without = split_picture(sheet.rgba, SheetOptions(without=(correction,)))
     assert len(boxes) == len(sheet.boxes)
