@@ -29,6 +29,7 @@ ALIKE = 0.8  # overlap of the runs of neighbouring rows
 OPEN = 0.5  # of the line's length with paper on both sides
 OPEN_UPRIGHT = 0.7  # the same of upright lines, which no figure stands behind
 OPEN_ACROSS = 0.2  # the same of a line that crosses the sheet, behind all figures
+OPEN_LIKE = 0.1  # the same of one that is like several others
 DASHES = 6  # flat pieces in a row: a dashed line
 EQUAL = 0.25  # of their length: dashes differ by less
 MOSTLY = 0.6  # of the dashes; figures cut some short
@@ -155,6 +156,7 @@ def _straight(paint: np.ndarray, thickest: int, *, vertical: bool) -> list[Line]
         if band[1] - band[0] < (thickest if band[3] - band[2] < paint.shape[1] else bar)
     ]
     lines += _broken(paint, lines)
+    lines += [] if vertical else _like_whole(paint, lines)
     shared = SHARED * paint.shape[1]
     return [
         line for line in lines if _is_open(paint, line, equals=_has_equals(line, lines, shared))
@@ -191,6 +193,28 @@ def _broken(paint: np.ndarray, lines: list[Line]) -> list[Line]:
         if line in found and (vertical or length >= CROSSING * side):
             long.append(line)
     return [line for line in found if line in long or _has_equals(line, found, SHARED * side)]
+
+
+def _like_whole(paint: np.ndarray, lines: list[Line]) -> list[Line]:
+    """Return levels that go on like several whole lines, though no piece of them is long."""
+    across = [line for line in lines if line.stop - line.start >= CROSSING * paint.shape[1]]
+    whole = [line for line in across if _has_equals(line, across, SHARED * paint.shape[1])]
+    if not whole:
+        return []
+    start, stop = whole[0].start, whole[0].stop
+    thin = min(line.last - line.first for line in whole if _ends_with(line, whole[0]))
+    rows, middle = paint[:, start:stop], len(paint) - thin - 4
+    if middle <= 0:
+        return []
+    drawn = np.logical_and.reduce([rows[2 + k : 2 + k + middle] for k in range(thin + 1)])
+    open_ = ~rows[:middle] & ~rows[thin + 4 :]
+    paper = np.count_nonzero(open_, axis=1)
+    crossed = np.count_nonzero(drawn & open_, axis=1)
+    first = 2 + np.flatnonzero(
+        (paper >= OPEN_LIKE * (stop - start)) & (crossed >= THROUGHOUT * paper)
+    )
+    levels = [Line(int(row), int(row) + thin, start, stop, vertical=False) for row in first]
+    return [level for level in levels if not any(_is_on(level, other) for other in whole)]
 
 
 def _length(pieces: list[Line]) -> int:
