@@ -156,11 +156,11 @@ def _straight(paint: np.ndarray, thickest: int, *, vertical: bool) -> list[Line]
         if band[1] - band[0] < (thickest if band[3] - band[2] < paint.shape[1] else bar)
     ]
     lines += _broken(paint, lines)
-    lines += [] if vertical else _like_whole(paint, lines)
     shared = SHARED * paint.shape[1]
-    return [
+    lines = [
         line for line in lines if _is_open(paint, line, equals=_has_equals(line, lines, shared))
     ]
+    return lines if vertical else lines + _like_whole(paint, lines)
 
 
 def _broken(paint: np.ndarray, lines: list[Line]) -> list[Line]:
