@@ -86,12 +86,9 @@ def find_lines(paint: Bool[np.ndarray, "height width"]) -> list[Line]:
         turned = np.ascontiguousarray(paint.T) if vertical else paint
         lines += _straight(turned, thickest, vertical=vertical)
         lines += _dashed(turned, thickest, vertical=vertical)
-    free = [
-        line
-        for line in lines
-        if _crosses(line, paint.shape) or _has_equals(line, lines, SHARED * width)
-    ]
-    closed = _closed(lines, free, JOINT * min(height, width) + thickest)
+    heights = [line for line in lines if _has_equals(line, lines, SHARED * width)]
+    free = [line for line in lines if _crosses(line, paint.shape) or line in heights]
+    closed = _closed(lines, free, JOINT * min(height, width) + thickest, heights)
     shortest = LEAST_SIDE * min(height, width)
     closed += _rectangles(paint, lines, shortest)
     return free + [
@@ -183,8 +180,7 @@ def _broken(paint: np.ndarray, lines: list[Line]) -> list[Line]:
         apart = [other for other in whole if abs(other.first - first) > LEAST_RUN_PX]
         if sum(_ends_with(level, other) for other in apart) > 1:  # a frame has one other side
             line = level
-            there = [*found, *(other for other in whole if _ends_with(line, other))]
-            if not any(_is_on(line, other) for other in there):
+            if line not in whole and not any(_is_on(line, other) for other in found):
                 found.append(line)
         elif len(own) > 1 and length >= (UPRIGHT if vertical else SHARED) * side:
             open_, rows = _open(paint, line), paint[first : last + 1, line.start : line.stop]
@@ -342,11 +338,11 @@ def _has_equals(line: Line, lines: list[Line], least: float) -> bool:
     return 1 + int((np.diff(levels) > LEAST_RUN_PX).sum()) >= EQUALS  # no line drawn by hand
 
 
-def _closed(lines: list[Line], free: list[Line], slack: float) -> list[Line]:
+def _closed(lines: list[Line], free: list[Line], slack: float, heights: list[Line]) -> list[Line]:
     """Return the lines both of whose ends meet lines across, until all do: rectangles, tables."""
     kept = list(lines)
     while True:
-        left = [line for line in kept if line in free or _is_joined(line, kept, slack)]
+        left = [line for line in kept if line in free or _is_joined(line, kept, slack, heights)]
         if len(left) == len(kept):
             return left
         kept = left
@@ -396,14 +392,19 @@ def _goes_on(paint: np.ndarray, line: Line) -> bool:
     return bool(open_.mean() >= OPEN_ACROSS and drawn.mean() >= THROUGHOUT)
 
 
-def _is_joined(line: Line, others: list[Line], slack: float) -> bool:
-    across = [other for other in others if other.vertical != line.vertical]
+def _is_joined(line: Line, others: list[Line], slack: float, heights: list[Line]) -> bool:
+    """Return whether both ends meet lines across; height lines have corners at their ends only."""
     middle = (line.first + line.last) / 2
-    return all(
-        any(
-            abs((other.first + other.last) / 2 - end) <= slack
-            and other.start - slack <= middle <= other.stop + slack
-            for other in across
-        )
-        for end in (line.start, line.stop)
-    )
+    met = [
+        (other.first + other.last) / 2
+        for other in others
+        if other.vertical != line.vertical and _reaches(other, middle, slack, other in heights)
+    ]
+    return all(any(abs(place - end) <= slack for place in met) for end in (line.start, line.stop))
+
+
+def _reaches(line: Line, place: float, slack: float, at_ends: bool) -> bool:
+    """Return whether a line reaches a place along it, or has one of its ends there."""
+    if at_ends:
+        return min(abs(place - line.start), abs(place - line.stop)) <= slack
+    return line.start - slack <= place <= line.stop + slack

@@ -10,7 +10,7 @@ from toonset.dataset.split.background import SURE_ENOUGH, Background, ring_of
 from toonset.dataset.split.figures.blobs import Blobs, find_blobs, shared_colors
 from toonset.dataset.split.figures.grouping import LEAST_PART
 from toonset.dataset.split.figures.open_outlines import LINE, Gap
-from toonset.dataset.split.figures.rows import LOWEST, OFF_ROW
+from toonset.dataset.split.figures.rows import LEAST_ROW, LOWEST, OFF_ROW, likeness, outline
 from toonset.dataset.split.pages import Pages
 from toonset.dataset.split.segment import SheetLayout, figure_cells
 from toonset.dataset.split.watermark import Watermark
@@ -23,6 +23,9 @@ PROPORTIONS = 1.2  # times the widest view's, or less than its inverse of the na
 ALIKE = 0.6  # of the colours that the views share among each other: less is another thing
 BROAD = 1.15  # times its own height: wider than arms reach
 NEARER = 1.2  # times the gap between parts and their bodies: so near a part may be another's
+GREY = 24  # levels between a colour's channels: ink and its soft edges have less
+COLORED = 0.3  # of a view: it is painted
+SAME_POSE = 0.65  # IoU of its outline with the most like other one
 LIKE_SIZED = 1.5  # times the height: a pair of parts
 AS_LIKELY = 0.6  # of the merit of the group that was taken: another may be the turnaround
 WHOLE = 0.6  # of the sheet that one view's box covers though there is text beside it
@@ -88,6 +91,7 @@ def figure_warnings(
         *_open_outlines(found, views),
         *_wide_views(views),
         *_off_row(views),
+        *_painted_alone(views),
         *_whole_page(found, views, rgba),
         *_panels(views, rgba),
         *_near_parts(found, views),
@@ -200,6 +204,25 @@ def _off_row(views: list[View]) -> list[str]:
                 "its row: is it another drawing?"
             )
     return said
+
+
+def _painted_alone(views: list[View]) -> list[str]:
+    """Return a line for a painted view among line drawings if its outline is like none of theirs.
+
+    Where it is, one drawing of a turnaround is coloured.
+    """
+    colored = [float((np.ptp(view.rgba[view.mask][:, :3], axis=1) > GREY).mean()) for view in views]
+    painted = [number for number, share in enumerate(colored) if share > COLORED]
+    if len(views) < LEAST_ROW or len(painted) != 1 or sorted(colored)[-2] > COLORED / 2:
+        return []
+    outlines = []
+    for view in views:
+        left, top, width, height = view.figure_box
+        x, y = left - view.box[0], top - view.box[1]
+        outlines.append(outline(view.mask[y : y + height, x : x + width]))
+    if likeness(outlines)[painted[0]] >= SAME_POSE:
+        return []
+    return [f"view {views[painted[0]].name} alone is painted, in another pose: is it a view?"]
 
 
 def _beside_row(top: int, height: int, views: list[View]) -> tuple[float, float]:

@@ -163,8 +163,8 @@ def _strays(blobs: Blobs, row: Int[np.ndarray, " row"]) -> Bool[np.ndarray, " ro
     off = away[level].min(axis=1) > OFF_ROW
     if standing.sum() < LEAST_ROW or not off.any():
         return none
-    outlines = [_outline(blobs, int(number)) for number in row]
-    usual = _likeness([outlines[i] for i in np.flatnonzero(standing)]).min()
+    outlines = [outline(blobs.mask(int(number))) for number in row]
+    usual = likeness([outlines[i] for i in np.flatnonzero(standing)]).min()
     for i in np.flatnonzero(off):
         none[i] = max(_alike(outlines[i], outlines[j]) for j in np.flatnonzero(standing)) < usual
     return none
@@ -182,12 +182,12 @@ def _group(blobs: Blobs, parts: list[np.ndarray], *, alone: bool) -> Group:
     members = np.concatenate(parts)
     order = rows_of(blobs.boxes[members], blobs.centers[members])
     rows = tuple(members[row] for row in order)
-    likeness = ALONE**2
+    alike = ALONE**2
     if not alone and len(members) > 1:
-        outlines = [_outline(blobs, int(n)) for n in members[:MOST_COMPARED]]
-        likeness = float(np.mean(_likeness(outlines) ** 2))
+        outlines = [outline(blobs.mask(int(n))) for n in members[:MOST_COMPARED]]
+        alike = float(np.mean(likeness(outlines) ** 2))
     height = float(np.median(blobs.boxes[members, 3]))
-    return Group(rows, height, likeness, _are_outfits(blobs, rows))
+    return Group(rows, height, alike, _are_outfits(blobs, rows))
 
 
 def _are_outfits(blobs: Blobs, rows: tuple[np.ndarray, ...]) -> bool:
@@ -200,7 +200,7 @@ def _are_outfits(blobs: Blobs, rows: tuple[np.ndarray, ...]) -> bool:
         return False
     if not 2 <= max(columns) <= MOST_COMPARED:
         return False
-    first, *others = [[_outline(blobs, int(number)) for number in row] for row in rows]
+    first, *others = [[outline(blobs.mask(int(number))) for number in row] for row in rows]
     for row in others:
         pairs = [*zip(first, row, strict=True)]
         same = np.array([_overlap(a, b) for a, b in pairs])
@@ -210,15 +210,15 @@ def _are_outfits(blobs: Blobs, rows: tuple[np.ndarray, ...]) -> bool:
     return True
 
 
-def _outline(blobs: Blobs, number: int) -> Bool[np.ndarray, "rows width"]:
-    """Return a patch with what it encloses, `ROWS` high."""
-    mask = np.ascontiguousarray(blobs.mask(number)).view(np.uint8)
+def outline(figure: Bool[np.ndarray, "height width"]) -> Bool[np.ndarray, "rows width"]:
+    """Return a figure that fills its window, `ROWS` high."""
+    mask = np.ascontiguousarray(figure).view(np.uint8)
     width = max(1, round(mask.shape[1] * ROWS / mask.shape[0]))
     covered = cv2.resize(255 * mask, (width, ROWS), interpolation=cv2.INTER_AREA)
     return covered > covered.max() // 2  # of what is thin, too, something is left
 
 
-def _likeness(outlines: list[np.ndarray]) -> Float[np.ndarray, " figures"]:
+def likeness(outlines: list[np.ndarray]) -> Float[np.ndarray, " figures"]:
     """Return per outline its best overlap with another one, mirrored or not."""
     found = np.zeros(len(outlines))
     for i, j in combinations(range(len(outlines)), 2):

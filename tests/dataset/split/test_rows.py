@@ -1,5 +1,6 @@
 """Rows of equal figures: the turnaround of a page among poses, busts and other clothes."""
 
+import cv2
 import numpy as np
 import pytest
 
@@ -95,3 +96,28 @@ def test_a_part_beside_the_head_belongs_to_the_figure_and_one_above_the_row_does
 
 def test_an_empty_sheet_has_no_group() -> None:
     assert find_groups(find_blobs(np.zeros((20, 20), dtype=bool))) == ()
+
+
+def painted(mask: np.ndarray) -> np.ndarray:
+    picture = np.where(mask[..., None], (200, 30, 40), (255, 255, 255)).astype(np.uint8)
+    return np.dstack([picture, np.full(mask.shape, 255, np.uint8)])
+
+
+def test_what_neither_stands_in_a_row_nor_looks_like_it_is_another_drawing() -> None:
+    mask = np.pad(figures(), ((0, 0), (0, 200))).astype(np.uint8)
+    bare = split_picture(painted(mask > 0)).views
+    cv2.ellipse(mask, (560, 130), (70, 30), 25, 0, 360, 1, -1)
+    cv2.ellipse(mask, (560, 130), (25, 50), 25, 0, 360, 1, -1)
+    found = split_picture(painted(mask > 0))
+    assert [view.box for view in found.views] == [view.box for view in bare]
+    assert found.warnings == ()
+
+
+@pytest.mark.parametrize(("height", "is_part"), [(16, True), (40, False)])
+def test_what_stands_beside_a_figure_and_is_larger_than_a_hand_is_no_part(
+    height: int, is_part: bool
+) -> None:
+    mask = figures().astype(np.uint8)
+    cv2.ellipse(mask, (281 + height // 4, 125), (height // 4, height // 2), 0, 0, 360, 1, -1)
+    views = split_picture(painted(mask > 0)).views
+    assert (views[2].figure_box[2] > views[0].figure_box[2] + 2) is is_part

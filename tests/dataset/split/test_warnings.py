@@ -149,3 +149,18 @@ def test_figures_over_the_edge_explain_a_little_of_the_border(
     paint, ground = find_paint(page, find_background(page))
     found = find_layout(page, paint, ground, (), LIKELIEST)
     assert bool(border_warnings(replace(ground, sure=sure), found)) == doubted
+
+
+@pytest.mark.parametrize(("posed", "doubted"), [(False, False), (True, True)])
+def test_one_painted_view_among_line_drawings_is_doubted_in_another_pose(
+    posed: bool, doubted: bool
+) -> None:
+    page = np.full((400, 900, 4), 255, np.uint8)
+    for number, x in enumerate((120, 370, 620)):
+        paint = (40, 110, 200, 255) if number == 0 else (255, 255, 255, 255)
+        tilt = 40 if posed and number == 0 else 0
+        axes = (60, 150) if not tilt else (90, 170)
+        cv2.ellipse(page, (x, 200), axes, tilt, 0, 360, paint, -1)
+        cv2.ellipse(page, (x, 200), axes, tilt, 0, 360, (10, 10, 10, 255), 4)
+    said = any("alone is painted" in line for line in split_picture(page).warnings)
+    assert said is doubted
