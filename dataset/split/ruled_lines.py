@@ -184,7 +184,7 @@ def _broken(paint: np.ndarray, lines: list[Line]) -> list[Line]:
                 found.append(line)
         elif len(own) > 1 and length >= (UPRIGHT if vertical else SHARED) * side:
             open_, rows = _open(paint, line), paint[first : last + 1, line.start : line.stop]
-            if open_.any() and rows.all(axis=0)[open_].mean() >= THROUGHOUT:
+            if open_.any() and rows[:, open_].all(axis=0).mean() >= THROUGHOUT:
                 found.append(line)
         if line in found and (vertical or length >= CROSSING * side):
             long.append(line)
@@ -357,11 +357,9 @@ def _rectangles(paint: np.ndarray, lines: list[Line], shortest: float) -> list[L
         sides = [replace(line, start=left.first, stop=right.last + 1) for line in across]
         sides = [line for line in sides if line.stop - line.start >= shortest]
         for top, bottom in combinations([line for line in sides if _goes_on(paint, line)], 2):
-            ends = {"start": top.first, "stop": bottom.last + 1}
-            both = [replace(line, **ends) for line in (left, right)]
-            if ends["stop"] - ends["start"] >= shortest and all(
-                _goes_on(paint.T, line) for line in both
-            ):
+            start, stop = top.first, bottom.last + 1
+            both = [replace(line, start=start, stop=stop) for line in (left, right)]
+            if stop - start >= shortest and all(_goes_on(paint.T, line) for line in both):
                 found |= dict.fromkeys([top, bottom, *both])
     return list(found)
 
@@ -388,7 +386,7 @@ def _levels(lines: list[Line], least: float) -> list[Line]:
 def _goes_on(paint: np.ndarray, line: Line) -> bool:
     """Return whether a line is drawn nearly wherever there is paper on both of its sides."""
     open_, rows = _open(paint, line), paint[line.first : line.last + 1, line.start : line.stop]
-    drawn = rows.all(axis=0)[open_]  # a line drawn by hand leaves its level
+    drawn = rows[:, open_].all(axis=0)  # a line drawn by hand leaves its level
     return bool(open_.mean() >= OPEN_ACROSS and drawn.mean() >= THROUGHOUT)
 
 
