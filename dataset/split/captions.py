@@ -20,13 +20,15 @@ import cv2
 import numpy as np
 from jaxtyping import UInt8
 
-from toonset.dataset.split.sheet import Segmentation
+from toonset.dataset.split.figures.rows import Taken
+from toonset.dataset.split.sheet import FigureGroup, Segmentation
 from toonset.view import Box
 
 LONGEST_PX = 2000  # of a sheet as it is read
 SURE = 0.8  # of a text, by the reader; printed words have .9 and more
 BAND = 0.25  # of a figure's height: a text farther below or above it is a title
 ASIDE = 0.1  # of a figure's height: its caption's middle is no farther beside it
+LEAST_SAID = 2  # captions that make a row of figures a turnaround
 LEAST_FUZZY = 6  # letters: "light" is no "right"
 SETTINGS = {  # one thread: the same texts on any number of cores
     "Global.log_level": "critical",
@@ -92,18 +94,33 @@ class Text:
     box: tuple[float, float, float, float]
 
 
-def with_captions(rgba: UInt8[np.ndarray, "height width 4"], found: Segmentation) -> Segmentation:
+def with_captions(
+    rgba: UInt8[np.ndarray, "height width 4"],
+    found: Segmentation,
+    cut: Callable[[Taken], Segmentation] | None = None,
+) -> Segmentation:
     """Return the drawings with their captions; as they are where no reader is installed.
 
     Args:
         rgba: the sheet.
         found: its views.
+        cut: returns those of another group, which is taken if it has captions and the likeliest
+            turnaround has none; None: a person said which group.
     """
     read = _reader()
     boxes = [view.figure_box for view in found.views]
-    if read is None or not _may_have_captions(found, boxes):
+    drawn = [box for group in found.groups for row in group.rows for box in row]
+    if read is None or not _may_have_captions(found, [*boxes, *drawn]):
         return found
-    labels = caption_labels(read(rgba), boxes)
+    texts = read(rgba)
+    labels = caption_labels(texts, boxes)
+    named = None if cut is None or any(labels) else _captioned_group(texts, found.groups)
+    if cut is not None and named is not None:
+        found = cut(Taken(named))
+        remark = f"group {named + 1} was taken: its figures have captions"
+        found = replace(found, remarks=(remark, *found.remarks))
+        boxes = [view.figure_box for view in found.views]
+        labels = caption_labels(texts, boxes)
     if not any(labels):
         return found
     listed = ", ".join(label or "?" for label in labels)
@@ -131,6 +148,16 @@ def caption_labels(texts: Sequence[Text], boxes: Sequence[Box]) -> tuple[str, ..
     said = [(text, label) for text in texts if (label := label_of(text.words))]
     ways = [_labels_beside(said, boxes, under) for under in (True, False)]
     return max(ways, key=lambda labels: sum(map(bool, labels)))
+
+
+def _captioned_group(texts: Sequence[Text], groups: Sequence[FigureGroup]) -> int | None:
+    """Return the group of which most figures have captions, two at least; None if none has."""
+    counts = [
+        (len(boxes), sum(map(bool, caption_labels(texts, boxes))))
+        for boxes in ([box for row in group.rows for box in row] for group in groups)
+    ]
+    said = [count if count >= max(LEAST_SAID, size / 2) else 0 for size, count in counts]
+    return int(np.argmax(said)) if any(said) else None
 
 
 def label_of(text: str) -> str:

@@ -113,6 +113,11 @@ class Cutting:
         }
         return tuple(name for name, value in named.items() if value)
 
+    @property
+    def names_figures(self) -> bool:
+        """Return whether a person said which figures are wanted."""
+        return bool(self.boxes or self.grid or self.group or self.outfit)
+
     def as_options(self) -> dict[str, Any]:
         """Return what is kept of it beside the results; only what was given."""
         named = {

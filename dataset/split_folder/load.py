@@ -21,8 +21,9 @@ from toonset.dataset.images.layers import layers_line
 from toonset.dataset.images.matting_network import MattingNetwork, read_network, without_background
 from toonset.dataset.images.picture import decode_rgba
 from toonset.dataset.split.captions import with_captions
+from toonset.dataset.split.figures.rows import Taken
 from toonset.dataset.split.pages import straightened
-from toonset.dataset.split.sheet import SheetOptions, split_picture
+from toonset.dataset.split.sheet import Segmentation, SheetOptions, split_picture
 from toonset.dataset.split_folder.boxes import check_boxes, read_boxes
 from toonset.dataset.split_folder.checks import odd_files
 from toonset.dataset.split_folder.corrected import Given
@@ -159,9 +160,12 @@ def _load(paths: Sequence[Path], cutting: Cutting, given: Given | None) -> Sheet
     if given is not None:
         cut = _as_corrected(places, cut, given)
         where = f"{given.path}: boxes" if given.content.boxes else where
+    told = cutting.names_figures or bool(given is not None and given.content.figures_key)
     network = None if cutting.matting is None else read_network(cutting.matting)
     parts = [
-        _of_split_folder(place) if options is None else _of_sheet(place, options, where, network)
+        _of_split_folder(place)
+        if options is None
+        else _of_sheet(place, options, where, network, told=told)
         for place, options in zip(places, cut, strict=True)
     ]
     whole = replace(_joined(parts), skipped=tuple(skipped))
@@ -269,8 +273,9 @@ def _of_split_folder(folder: Path) -> Sheet:
 
 
 def _of_sheet(
-    path: Path, options: SheetOptions, where: str, network: MattingNetwork | None
+    path: Path, options: SheetOptions, where: str, network: MattingNetwork | None, *, told: bool
 ) -> Sheet:
+    """Return the views of one file; `told`: a person said which figures are wanted."""
     data = read_whole(path, "picture", PictureError)
     picture = decode_rgba(data, path)
     if network is not None:
@@ -279,8 +284,13 @@ def _of_sheet(
     picture = picture if flat is None else flat
     height, width = picture.shape[:2]
     check_boxes(options.boxes, (width, height), where)
+
+    def another(taken: Taken) -> Segmentation:
+        return split_picture(picture, replace(options, taken=taken))
+
     try:
-        found = with_captions(picture, split_picture(picture, options))
+        found = split_picture(picture, options)
+        found = with_captions(picture, found, None if told else another)
     except SheetError as error:
         raise SheetError(f"{path}: {error}") from error
     if flat is not None:

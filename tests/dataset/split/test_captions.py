@@ -188,3 +188,32 @@ def test_a_split_folder_keeps_captions_and_labels_replace_them(reader, tmp_path)
         ("", ""),
         ("front", ""),
     ]
+
+
+def two_rows(tmp_path):
+    """Return a sheet with three large figures, and three small ones with a word under each."""
+    rgb = np.full((320, 420, 3), 255, np.uint8)
+    for x, color in ((70, (200, 30, 40)), (200, (20, 60, 180)), (330, (30, 120, 60))):
+        cv2.ellipse(rgb, (x, 80), (30, 68), 0, 0, 360, color, -1)
+        cv2.ellipse(rgb, (x, 220), (20, 42), 0, 0, 360, color, -1)
+        cv2.putText(rgb, "WORD", (x - 30, 285), cv2.FONT_HERSHEY_SIMPLEX, 0.7, (0, 0, 0), 2)
+    file = tmp_path / "two_rows.png"
+    file.write_bytes(encode_png(np.dstack([rgb, np.full((320, 420), 255, np.uint8)])))
+    return file
+
+
+def test_the_group_with_captions_is_taken(reader, tmp_path):
+    sheet = split_sheet(two_rows(tmp_path))
+    assert sheet.split.labels == ("front", "side", "back")
+    assert [view.figure_box[3] for view in sheet.views] == [85] * 3
+    assert "group 2 was taken: its figures have captions" in sheet.split.sources[0].remarks
+
+
+def test_what_a_person_takes_stays(reader, tmp_path):
+    sheet = split_sheet(two_rows(tmp_path), group=1)
+    assert [view.figure_box[3] for view in sheet.views] == [137] * 3
+
+
+def test_one_caption_takes_no_group(reader, monkeypatch, tmp_path):
+    monkeypatch.setattr(reader, "said", ("FRONT", "Bob", "Ann"))
+    assert [view.figure_box[3] for view in split_sheet(two_rows(tmp_path)).views] == [137] * 3
