@@ -14,9 +14,10 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
+from toonset.dataset.images.zones import find_zones, shrunk
 from toonset.dataset.split.background import Background, difference, of_paper, ring_of
 from toonset.dataset.split.background_field import fit_zone
-from toonset.dataset.split.background_zones import LEAST_ZONE, find_zones, shrunk
+from toonset.dataset.split.background_zones import LEAST_ZONE
 from toonset.raster import connected_to, dilate, erode, from_nearest, sized_parts
 
 LONGEST_PX = 800  # of the copy in which pages are looked for
