@@ -19,6 +19,7 @@ from toonset.dataset.split.background_pattern import Plate
 from toonset.raster import dilate, from_nearest, parts
 
 LONGEST_PX = 1600  # of the copy in which steps are looked for
+PANELS_PX = 1200  # of the copy in which panels are looked for
 LEAST_PIECE = 0.0005  # of the sheet: a smaller patch is no zone
 LEAST_ZONE = 0.06  # of the border
 TOGETHER = 0.9  # of the border
@@ -27,14 +28,16 @@ LEAST_PATCH = 0.01  # of the sheet: figures part a zone into patches of its colo
 CLOSE = 8  # levels from the zone's colour
 STEP_PX = 6  # half the width of a step
 LEAST_FACET = 0.0001  # of the sheet: a smaller patch is no zone of a backdrop
+FLAT = 0.5  # of a zone in its median colour: the others slope or are patterned
 LEAST_MEETING = 0.06  # of the shorter side: so long is the straight edge on which zones meet
 ON_EDGES = 0.6  # of the length on which a zone meets the backdrop
+ALL_ALONG = 0.8  # the same of thin zones: frames of panels, no outlines of figures
 WIDE = 0.5  # of the sheet's width: a zone cut off from the border may have a colour of its own
 SHADE = 32  # levels from such colours: other zones that are cut off
 ALL_ROUND = 0.9  # of its outline: a zone with so much backdrop around it lies on it
 SWATCH = 0.9  # of its bounding box: such a zone is a patch of colour
 LEAST_PANEL = 0.1  # of the sheet
-WITHIN = 0.7  # of what is drawn on a panel: heads and feet stand over its edges, but no more
+WITHIN = 0.5  # of what is drawn on a panel: heads and feet stand over its edges
 LEAST_SIDE = 0.5  # of each side of a panel that shows: corners that are cut out take the rest
 STANDING = 0.6  # of a panel's height: a drawing as high stands on it
 
@@ -82,7 +85,7 @@ def fit_backdrop(
         ring: its border.
         only_panels: the border is one colour: what is added must be panels that figures stand on.
     """
-    small, shrink = shrunk(rgb, LONGEST_PX)
+    small, shrink = shrunk(rgb, PANELS_PX if only_panels else LONGEST_PX)
     zones = find_zones(small, shrink, LEAST_FACET)
     border = _outermost(ring, zones.labels.shape)
     at_border = np.bincount(zones.labels[border], minlength=zones.count + 1)
@@ -90,7 +93,7 @@ def fit_backdrop(
     seeds[0] = False
     if not seeds.any():
         return None
-    values = _values(zones, small)
+    values, flat = _values(zones, small)
     meetings = find_meetings(zones, values, small)
     away = _distances(zones, values)
     if only_panels:
@@ -98,8 +101,8 @@ def fit_backdrop(
         ground = seeds | _panels(_joined(seeds, other, meetings, zones) & ~seeds, seeds, zones)
         found = bool((ground & ~seeds).any())
     else:
-        possible = _may_be_backdrop(at_border > 0, away, zones)
-        ground = _joined(seeds, possible, meetings, zones)
+        possible = flat & _may_be_backdrop(at_border > 0, away, zones)
+        ground = _joined(seeds & flat, possible, meetings, zones)
         found = ground.sum() > 1 and ground[zones.grown[border]].mean() >= TOGETHER
     if not found:
         return None
@@ -173,17 +176,18 @@ def _laid(
 
 def _values(
     zones: Zones, small: UInt8[np.ndarray, "rows columns 3"]
-) -> UInt8[np.ndarray, "rows columns 3"]:
-    """Return the colours of the zones without their noise; beyond them the nearest zone's."""
+) -> tuple[UInt8[np.ndarray, "rows columns 3"], Bool[np.ndarray, " zones"]]:
+    """Return the zones' colours without noise, beyond them the nearest zone's; which are flat."""
     values = zones.colors(small).round().astype(np.uint8)[zones.labels]
     away = cv2.absdiff(small, values).max(axis=2)
-    for number, window in enumerate(zones.windows, start=1):
-        own = zones.labels[window] == number
-        large = zones.areas[number] >= LEAST_PATCH * zones.labels.size
-        if large and (away[window][own] <= CLOSE).mean() < TOGETHER:
-            whole = zones.labels == number
-            values[whole] = fit_zone(small, whole).colors((0, 0, *small.shape[1::-1]))[whole]
-    return from_nearest(values, zones.labels > 0)
+    close = np.bincount(zones.labels[away <= CLOSE], minlength=zones.count + 1)
+    large = zones.areas >= LEAST_PATCH * zones.labels.size
+    sloping = large & (close < TOGETHER * zones.areas)
+    sloping[0] = False
+    for number in np.flatnonzero(sloping):
+        whole = zones.labels == number
+        values[whole] = fit_zone(small, whole).colors((0, 0, *small.shape[1::-1]))[whole]
+    return from_nearest(values, zones.labels > 0), close >= FLAT * zones.areas
 
 
 def _distances(
@@ -212,17 +216,17 @@ def _joined(
 ) -> Bool[np.ndarray, " zones"]:
     """Return the zones that meet the seeds, or each other, in straight steps.
 
-    Patches of colour that lie on the backdrop are not of it, nor are drawn outlines.
+    Patches of colour that lie on the backdrop are not of it.
     """
     ground, least = seeds, LEAST_MEETING * min(zones.labels.shape)
     outline = meetings.length.sum(axis=1)
     patch = (zones.areas >= SWATCH * zones.sizes_wh.prod(axis=1)) & ~zones.are_lines
     patch &= zones.areas < LEAST_PATCH * zones.labels.size
-    possible = possible & (zones.are_lines | ~zones.are_thin)
+    share = np.where(zones.are_thin & ~zones.are_lines, ALL_ALONG, ON_EDGES)
     while True:
         length = meetings.length[:, ground].sum(axis=1)
         straight = meetings.straight[:, ground].sum(axis=1)
-        joined = (straight >= least) & (straight >= ON_EDGES * length) & possible & ~ground
+        joined = (straight >= least) & (straight >= share * length) & possible & ~ground
         joined &= ~(patch & (length >= ALL_ROUND * outline))
         if not joined.any():
             return ground

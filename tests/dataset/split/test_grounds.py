@@ -401,7 +401,7 @@ def test_a_panel_over_whose_edge_figures_stand() -> None:
     outside = ~np.pad(mask, ((10, 50), (40, 40)))[below]
     rgba[below][outside] = 255
     found = assert_right(rgba, np.pad(mask, ((10, 50), (40, 40))))
-    assert any("what lies around one page" in remark for remark in found.remarks)
+    assert any("straight edges" in remark for remark in found.remarks)
 
 
 def test_a_boxy_figure_is_no_panel() -> None:
