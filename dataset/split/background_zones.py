@@ -37,6 +37,7 @@ SHADE = 32  # levels from such colours: other zones that are cut off
 ALL_ROUND = 0.9  # of its outline: a zone with so much backdrop around it lies on it
 SWATCH = 0.9  # of its bounding box: such a zone is a patch of colour
 LEAST_PANEL = 0.1  # of the sheet
+SHOWN = 0.3  # of a panel that is not drawn on: less is a frame
 WITHIN = 0.5  # of what is drawn on a panel: heads and feet stand over its edges
 LEAST_SIDE = 0.5  # of each side of a panel that shows: corners that are cut out take the rest
 STANDING = 0.6  # of a panel's height: a drawing as high stands on it
@@ -260,7 +261,7 @@ def _is_panel(
     """Return whether zones show a rectangle within which most of what is drawn on it stands."""
     x, y, width, height = cv2.boundingRect(own.view(np.uint8))
     window = slice(y, y + height), slice(x, x + width)
-    if width * height < LEAST_PANEL * own.size:
+    if width * height < LEAST_PANEL * own.size or own[window].mean() < SHOWN:
         return False
     across = width >= own.shape[1] - 2 * reach
     if not across and np.count_nonzero(drawn[window]) < WITHIN * np.count_nonzero(drawn):

@@ -13,7 +13,7 @@ from PIL import Image
 from toonset.cli.editor.scene import sheet_url
 from toonset.dataset.images.zones import find_meetings, find_zones
 from toonset.dataset.split.background import remove_residual_alpha, ring_of
-from toonset.dataset.split.background_zones import fit_steps
+from toonset.dataset.split.background_zones import fit_backdrop, fit_steps
 from toonset.dataset.split.pages import find_pages, straightened
 from toonset.dataset.split.sheet import Segmentation, split_picture
 from toonset.dataset.split.watermark import find_watermark
@@ -555,6 +555,14 @@ def test_blocky_figures_are_no_panels(name: str) -> None:
     picture, truth = blocky_figures(ground)
     found = assert_right(opaque(picture), truth)
     assert not found.warnings
+
+
+def test_a_drawn_frame_is_no_panel() -> None:
+    picture, truth = large_figures(large_plain((242, 237, 223)))
+    for inset in (10, 16):
+        cv2.rectangle(picture, (inset, inset), (1199 - inset, 519 - inset), (30, 50, 120), 4)
+    assert fit_backdrop(picture, ring_of(520, 1200), only_panels=True) is None
+    assert_right(opaque(picture), truth)
 
 
 def test_zones_meet_in_straight_steps() -> None:
