@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float, UInt8
 from toonset.dataset.images.jpeg_noise import halo_levels, has_jpeg_grid
 from toonset.dataset.split.background_field import Field, fit_gradient, fit_smooth
 from toonset.dataset.split.background_pattern import Plate, fit_pattern
-from toonset.dataset.split.background_zones import fit_steps
+from toonset.dataset.split.background_zones import CLOSE, fit_backdrop, fit_steps
 from toonset.errors import SheetError
 from toonset.view import Box, over_white
 
@@ -41,6 +41,7 @@ CLEARLY = 0.98  # of the border in one colour with less noise than that: nothing
 RING = 0.02  # of the shorter side: the border that is looked at
 INSETS = (0.0, 0.02, 0.04, 0.06, 0.08)  # of the shorter side: where it is looked for
 COMMON = 0.3  # of the sheet: a colour that covers less is not background but a frame
+SECOND = 0.1  # of the sheet in one colour that is not the border's: it may be a panel
 MOST_SAMPLES = 200_000  # border pixels that are looked at
 
 
@@ -113,6 +114,7 @@ def find_background(
         steps = _steps(rgba, places, colors, inset)
         if steps is not None and (found.sure < SURE_ENOUGH or _is_worth_it(steps, found)):
             found = steps
+    found = _backdrop(rgba, places, colors, inset, found) or found
     found = replace(found, inset=inset)
     if found.sure < LEAST_SURE:
         raise SheetError(
@@ -261,6 +263,37 @@ def _steps(
     return _of_plate(
         "stepped", fit_steps(rgb, ring_of(rgb.shape[0], rgb.shape[1], inset)), places, colors
     )
+
+
+def _backdrop(
+    rgba: np.ndarray,
+    places: tuple[np.ndarray, np.ndarray],
+    colors: np.ndarray,
+    inset: float,
+    found: Background,
+) -> Background | None:
+    """Return a graphic backdrop, if the border or a second large colour asks for it."""
+    of_one_color = found.sure >= SURE_ENOUGH and found.kind != "stepped"
+    if of_one_color and (found.kind != "plain" or not _has_second_color(rgba, found.rgb)):
+        return None
+    rgb = np.ascontiguousarray(rgba[..., :3])
+    ring = ring_of(rgb.shape[0], rgb.shape[1], inset)
+    plate = fit_backdrop(rgb, ring, only_panels=of_one_color)
+    backdrop = _of_plate("stepped", plate, places, colors)
+    if backdrop is None or of_one_color:
+        return backdrop
+    return replace(backdrop, tolerance=max(backdrop.tolerance, CLOSE))  # zones hold faint facets
+
+
+def _has_second_color(rgba: np.ndarray, rgb: tuple[int, int, int] | None) -> bool:
+    """Return whether a colour other than the background's covers as much as a panel."""
+    step = max(1, round((rgba.shape[0] * rgba.shape[1] / MOST_SAMPLES) ** 0.5))
+    colors = rgba[::step, ::step, :3].reshape(-1, 3)
+    other = colors[np.abs(colors - np.array(rgb, dtype=np.int16)).max(axis=1) > LEAST_TOLERANCE]
+    if len(other) < SECOND * len(colors):
+        return False
+    bins = (other // BINS).astype(np.int64) @ (BINS * BINS, BINS, 1)
+    return bool(np.bincount(bins).max() >= SECOND * len(colors))
 
 
 def _of_plate(

@@ -1,25 +1,25 @@
-"""Find the smooth zones of a picture, and fit backgrounds of several: a horizon, two halves, edges.
+"""Fit backgrounds of several smooth zones: a horizon, two halves, bands, panels behind figures.
 
-A zone is a connected patch without edges: its colour may change slowly. Zones that together take
-the border are one ground with steps. At a step the picture passes from one zone's colour to the
-other's, so both and what lies between them are ground where the two zones meet.
+Zones that together take the border are one ground with steps. At a step the picture passes from
+one zone's colour to the other's, so both and what lies between them are ground where the two meet.
+
+Graphic backdrops are laid of many zones. From the border on, a zone is of the backdrop if it meets
+those that are already in straight steps: figures have curved outlines, or lines around them.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import cv2
 import numpy as np
-from jaxtyping import Bool, Int, UInt8
+from jaxtyping import Bool, Float, UInt8
 
+from toonset.dataset.images.zones import Meetings, Zones, find_meetings, find_zones, shrunk
 from toonset.dataset.split.background_field import Field, fit_zone
 from toonset.dataset.split.background_pattern import Plate
-from toonset.raster import dilate, from_nearest
+from toonset.raster import dilate, from_nearest, parts
 
 LONGEST_PX = 1600  # of the copy in which steps are looked for
-MEDIAN_PX = 5  # grain and thin lines are no edges
-EDGE = 7  # levels between neighbours
+PANELS_PX = 1200  # of the copy in which panels are looked for
 LEAST_PIECE = 0.0005  # of the sheet: a smaller patch is no zone
 LEAST_ZONE = 0.06  # of the border
 TOGETHER = 0.9  # of the border
@@ -27,63 +27,20 @@ LEAST_STEP = 12  # levels: a fainter one is noise
 LEAST_PATCH = 0.01  # of the sheet: figures part a zone into patches of its colour
 CLOSE = 8  # levels from the zone's colour
 STEP_PX = 6  # half the width of a step
-
-
-@dataclass(frozen=True, eq=False)
-class Zones:
-    """Smooth connected patches of a picture.
-
-    Attributes:
-        labels: (rows, columns) number of the zone, from 1; 0 at edges and in small patches.
-        shrink: cells of `labels` per pixel of the picture, at most 1.
-    """
-
-    labels: Int[np.ndarray, "rows columns"]
-    shrink: float
-
-    @property
-    def count(self) -> int:
-        """Return how many zones there are."""
-        return int(self.labels.max())
-
-    def mask(
-        self, numbers: list[int], size_wh: tuple[int, int]
-    ) -> Bool[np.ndarray, "height width"]:
-        """Return the pixels of zones in the picture."""
-        own = np.isin(self.labels, numbers).view(np.uint8)
-        return cv2.resize(own, size_wh, interpolation=cv2.INTER_NEAREST) > 0
-
-
-def find_zones(
-    rgb: UInt8[np.ndarray, "height width 3"], shrink: float, least_share: float
-) -> Zones:
-    """Return the zones that take more than a share of the picture.
-
-    Args:
-        rgb: the picture, shrunk already.
-        shrink: its cells per pixel of the whole one.
-        least_share: of the picture.
-    """
-    small = cv2.medianBlur(np.ascontiguousarray(rgb), MEDIAN_PX)
-    near = np.ones((3, 3), np.uint8)
-    steep = cv2.subtract(cv2.dilate(small, near), cv2.erode(small, near)).max(axis=2)
-    smooth = (steep <= EDGE).view(np.uint8)
-    _, found, stats, _ = cv2.connectedComponentsWithStats(smooth, connectivity=4)
-    large = stats[:, cv2.CC_STAT_AREA] >= least_share * smooth.size
-    large[0] = False
-    number = np.where(large, np.cumsum(large), 0).astype(np.int32)
-    return Zones(number[np.asarray(found, dtype=np.int32)], shrink)
-
-
-def shrunk(
-    picture: UInt8[np.ndarray, "height width c"], longest_px: int
-) -> tuple[np.ndarray, float]:
-    """Return a picture no longer than that, and its cells per pixel of the whole one."""
-    shrink = min(1.0, longest_px / max(picture.shape[:2]))
-    if shrink == 1:
-        return picture, shrink
-    size = (max(round(side * shrink), 1) for side in picture.shape[1::-1])
-    return cv2.resize(picture, tuple(size), interpolation=cv2.INTER_AREA), shrink
+LEAST_FACET = 0.0001  # of the sheet: a smaller patch is no zone of a backdrop
+FLAT = 0.5  # of a zone in its median colour: the others slope or are patterned
+LEAST_MEETING = 0.06  # of the shorter side: so long is the straight edge on which zones meet
+ON_EDGES = 0.6  # of the length on which a zone meets the backdrop
+ALL_ALONG = 0.8  # the same of thin zones: frames of panels, no outlines of figures
+WIDE = 0.5  # of the sheet's width: a zone cut off from the border may have a colour of its own
+SHADE = 32  # levels from such colours: other zones that are cut off
+ALL_ROUND = 0.9  # of its outline: a zone with so much backdrop around it lies on it
+SWATCH = 0.9  # of its bounding box: such a zone is a patch of colour
+LEAST_PANEL = 0.1  # of the sheet
+SHOWN = 0.3  # of a panel that is not drawn on: less is a frame
+WITHIN = 0.5  # of what is drawn on a panel: heads and feet stand over its edges
+LEAST_SIDE = 0.5  # of each side of a panel that shows: corners that are cut out take the rest
+STANDING = 0.6  # of a panel's height: a drawing as high stands on it
 
 
 def fit_steps(
@@ -114,6 +71,45 @@ def fit_steps(
     if taken[ring].mean() < TOGETHER or step < LEAST_STEP:
         return None
     return Plate(_laid(rgb, masks, fields), fields[0].typical, f"{len(groups)} zones at its border")
+
+
+def fit_backdrop(
+    rgb: UInt8[np.ndarray, "height width 3"],
+    ring: Bool[np.ndarray, "height width"],
+    *,
+    only_panels: bool,
+) -> Plate | None:
+    """Return a background of zones that meet in straight steps, from the border on; None if none.
+
+    Args:
+        rgb: the sheet.
+        ring: its border.
+        only_panels: the border is one colour: what is added must be panels that figures stand on.
+    """
+    small, shrink = shrunk(rgb, PANELS_PX if only_panels else LONGEST_PX)
+    zones = find_zones(small, shrink, LEAST_FACET)
+    border = _outermost(ring, zones.labels.shape)
+    at_border = np.bincount(zones.labels[border], minlength=zones.count + 1)
+    seeds = at_border >= LEAST_ZONE * at_border.sum()
+    seeds[0] = False
+    if not seeds.any():
+        return None
+    values, flat = _values(zones, small)
+    meetings = find_meetings(zones, values, small)
+    away = _distances(zones, values)
+    if only_panels:
+        other = np.asarray((away[:, seeds] >= LEAST_STEP).all(axis=1))
+        ground = seeds | _panels(_joined(seeds, other, meetings, zones) & ~seeds, seeds, zones)
+        found = bool((ground & ~seeds).any())
+    else:
+        possible = flat & _may_be_backdrop(at_border > 0, away, zones)
+        ground = _joined(seeds & flat, possible, meetings, zones)
+        found = ground.sum() > 1 and ground[zones.grown[border]].mean() >= TOGETHER
+    if not found:
+        return None
+    red, green, blue = (round(float(x)) for x in np.median(values[seeds[zones.labels]], axis=0))
+    plate = _plate(rgb, zones, values, ground)
+    return Plate(plate, (red, green, blue), f"{ground.sum()} zones with straight edges")
 
 
 def _outermost(
@@ -177,3 +173,135 @@ def _laid(
         high = np.where(near[..., None], np.maximum(high, colors), high)
     between = np.clip(rgb, low, np.maximum(low, high))
     return np.where((met >= 2)[..., None], between, plate)
+
+
+def _values(
+    zones: Zones, small: UInt8[np.ndarray, "rows columns 3"]
+) -> tuple[UInt8[np.ndarray, "rows columns 3"], Bool[np.ndarray, " zones"]]:
+    """Return the zones' colours without noise, beyond them the nearest zone's; which are flat."""
+    values = zones.colors(small).round().astype(np.uint8)[zones.labels]
+    away = cv2.absdiff(small, values).max(axis=2)
+    close = np.bincount(zones.labels[away <= CLOSE], minlength=zones.count + 1)
+    large = zones.areas >= LEAST_PATCH * zones.labels.size
+    sloping = large & (close < TOGETHER * zones.areas)
+    sloping[0] = False
+    for number in np.flatnonzero(sloping):
+        whole = zones.labels == number
+        values[whole] = fit_zone(small, whole).colors((0, 0, *small.shape[1::-1]))[whole]
+    return from_nearest(values, zones.labels > 0), close >= FLAT * zones.areas
+
+
+def _distances(
+    zones: Zones, values: UInt8[np.ndarray, "rows columns 3"]
+) -> Float[np.ndarray, "zones zones"]:
+    """Return how far apart the zones' colours are, in levels; inf of what is no zone."""
+    colors = zones.colors(values)
+    away = np.abs(colors[:, None] - colors).max(axis=2)
+    away[0], away[:, 0] = np.inf, np.inf
+    return away
+
+
+def _may_be_backdrop(
+    at_border: Bool[np.ndarray, " zones"], away: Float[np.ndarray, "zones zones"], zones: Zones
+) -> Bool[np.ndarray, " zones"]:
+    """Return the zones that reach the border or far across, and those in about such a colour."""
+    reaching = at_border | (zones.sizes_wh[:, 0] >= WIDE * zones.labels.shape[1])
+    return np.asarray((away[:, reaching] <= SHADE).any(axis=1))
+
+
+def _joined(
+    seeds: Bool[np.ndarray, " zones"],
+    possible: Bool[np.ndarray, " zones"],
+    meetings: Meetings,
+    zones: Zones,
+) -> Bool[np.ndarray, " zones"]:
+    """Return the zones that meet the seeds, or each other, in straight steps.
+
+    Patches of colour that lie on the backdrop are not of it.
+    """
+    ground, least = seeds, LEAST_MEETING * min(zones.labels.shape)
+    outline = meetings.length.sum(axis=1)
+    patch = (zones.areas >= SWATCH * zones.sizes_wh.prod(axis=1)) & ~zones.are_lines
+    patch &= zones.areas < LEAST_PATCH * zones.labels.size
+    share = np.where(zones.are_thin & ~zones.are_lines, ALL_ALONG, ON_EDGES)
+    while True:
+        length = meetings.length[:, ground].sum(axis=1)
+        straight = meetings.straight[:, ground].sum(axis=1)
+        joined = (straight >= least) & (straight >= share * length) & possible & ~ground
+        joined &= ~(patch & (length >= ALL_ROUND * outline))
+        if not joined.any():
+            return ground
+        ground = ground | joined
+
+
+def _panels(
+    candidates: Bool[np.ndarray, " zones"], seeds: Bool[np.ndarray, " zones"], zones: Zones
+) -> Bool[np.ndarray, " zones"]:
+    """Return the zones, of those, that are panels on which figures stand.
+
+    Args:
+        candidates: zones that meet the page, or each other, in straight steps.
+        seeds: the zones of the page.
+        zones: all of them.
+    """
+    panels = np.zeros_like(candidates)
+    things = parts(~seeds[zones.grown])
+    of_panel = candidates[zones.grown]
+    for number in np.unique(things[of_panel]):
+        thing = things == number
+        own = thing & of_panel
+        if _is_panel(own, thing & ~own, zones.reach):
+            panels[np.unique(zones.grown[own])] = True
+    return panels
+
+
+def _is_panel(
+    own: Bool[np.ndarray, "rows columns"], drawn: Bool[np.ndarray, "rows columns"], reach: int
+) -> bool:
+    """Return whether zones show a rectangle within which most of what is drawn on it stands."""
+    x, y, width, height = cv2.boundingRect(own.view(np.uint8))
+    window = slice(y, y + height), slice(x, x + width)
+    if width * height < LEAST_PANEL * own.size or own[window].mean() < SHOWN:
+        return False
+    across = width >= own.shape[1] - 2 * reach
+    if not across and np.count_nonzero(drawn[window]) < WITHIN * np.count_nonzero(drawn):
+        return False
+    for turns in range(4):
+        if _side(np.rot90(own[window], turns), np.rot90(drawn[window], turns)) < LEAST_SIDE:
+            return False
+    on_it = np.ascontiguousarray(drawn[window]).view(np.uint8)
+    _, _, stats, _ = cv2.connectedComponentsWithStats(on_it, connectivity=8)
+    return int(stats[1:, cv2.CC_STAT_HEIGHT].max(initial=0)) >= STANDING * height
+
+
+def _side(
+    panel: Bool[np.ndarray, "rows columns"], drawn: Bool[np.ndarray, "rows columns"]
+) -> float:
+    """Return the share of a panel's upper side that shows, without what is drawn over it."""
+    first = panel.argmax(axis=0)[panel.any(axis=0)]
+    near = np.convolve(np.bincount(first, minlength=3), np.ones(3, int), "same")  # by hand
+    free = panel.shape[1] - np.count_nonzero(drawn[near.argmax()])
+    return float(near.max() / max(free, 1))
+
+
+def _plate(
+    rgb: UInt8[np.ndarray, "height width 3"],
+    zones: Zones,
+    values: UInt8[np.ndarray, "rows columns 3"],
+    ground: Bool[np.ndarray, " zones"],
+) -> UInt8[np.ndarray, "height width 3"]:
+    """Return the colours of a ground of zones; the sheet's own, clipped to the zones', at steps."""
+    size_wh = rgb.shape[1], rgb.shape[0]
+    mask = dilate(zones.mask(np.flatnonzero(ground).tolist(), size_wh), STEP_PX)
+    near = from_nearest(values, ground[zones.labels])
+    colors = cv2.resize(near, size_wh, interpolation=cv2.INTER_NEAREST)
+    known = mask & (cv2.absdiff(rgb, colors).max(axis=2) <= CLOSE)
+    lines = zones.mask(np.flatnonzero(ground & zones.are_lines).tolist(), size_wh)
+    broad = known & ~dilate(lines, STEP_PX)  # a line's colour does not spread into figures
+    plate = np.where(known[..., None], colors, from_nearest(colors, broad))
+    reach = np.ones((2 * STEP_PX + 1,) * 2, np.uint8)
+    low = cv2.erode(np.where(known[..., None], plate, np.uint8(255)), reach)
+    high = cv2.dilate(np.where(known[..., None], plate, np.uint8(0)), reach)
+    met = (high.astype(np.int16) - low > CLOSE).any(axis=2)
+    between = np.clip(rgb, low, np.maximum(low, high))
+    return np.where(met[..., None], between, plate)

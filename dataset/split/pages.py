@@ -14,9 +14,17 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
-from toonset.dataset.split.background import Background, difference, of_paper, ring_of
+from toonset.dataset.images.zones import find_zones, shrunk
+from toonset.dataset.split.background import (
+    Background,
+    difference,
+    find_background,
+    of_paper,
+    ring_of,
+)
 from toonset.dataset.split.background_field import fit_zone
-from toonset.dataset.split.background_zones import LEAST_ZONE, find_zones, shrunk
+from toonset.dataset.split.background_zones import LEAST_ZONE
+from toonset.errors import SheetError
 from toonset.raster import connected_to, dilate, erode, from_nearest, sized_parts
 
 LONGEST_PX = 800  # of the copy in which pages are looked for
@@ -276,10 +284,20 @@ def _panel(
     heights = _heights(drawn, np.zeros_like(drawn))
     if heights.max(initial=0) < FRAMED * np.count_nonzero(inside.any(axis=1)):
         return None
+    if _is_flat(rgba):
+        return None
     beyond = dilate(own, CELLS) & ~dilate(inside, edge + CELLS)
     cells = inside | (dilate(beyond, edge + CELLS) & own)
     mask = cv2.resize(cells.view(np.uint8), size_wh, interpolation=cv2.INTER_NEAREST) > 0
     return Pages(mask, np.dstack([shown, np.full_like(shown[..., :1], 255)]), 1, True, paper)
+
+
+def _is_flat(rgba: UInt8[np.ndarray, "height width 4"]) -> bool:
+    """Return whether the page and its panels are flat, so all of the sheet can stay as it is."""
+    try:
+        return find_background(rgba).kind == "stepped"
+    except SheetError:
+        return False
 
 
 def _paper_of(

@@ -11,8 +11,9 @@ import pytest
 from PIL import Image
 
 from toonset.cli.editor.scene import sheet_url
+from toonset.dataset.images.zones import find_meetings, find_zones
 from toonset.dataset.split.background import remove_residual_alpha, ring_of
-from toonset.dataset.split.background_zones import find_zones, fit_steps
+from toonset.dataset.split.background_zones import fit_backdrop, fit_steps
 from toonset.dataset.split.pages import find_pages, straightened
 from toonset.dataset.split.sheet import Segmentation, split_picture
 from toonset.dataset.split.watermark import find_watermark
@@ -400,7 +401,7 @@ def test_a_panel_over_whose_edge_figures_stand() -> None:
     outside = ~np.pad(mask, ((10, 50), (40, 40)))[below]
     rgba[below][outside] = 255
     found = assert_right(rgba, np.pad(mask, ((10, 50), (40, 40))))
-    assert any("what lies around one page" in remark for remark in found.remarks)
+    assert any("straight edges" in remark for remark in found.remarks)
 
 
 def test_a_boxy_figure_is_no_panel() -> None:
@@ -435,3 +436,142 @@ def test_places_are_those_of_the_straightened_picture(tmp_path: Path) -> None:
         np.frombuffer(base64.b64decode(sheet_url(file, sheet).partition(",")[2]), np.uint8), 1
     )
     np.testing.assert_array_equal(shown[..., ::-1], picture[..., :3])
+
+
+def bands() -> Picture:
+    """Return flat bands parted by white lines, under a strip with a title."""
+    ground = large_plain((225, 250, 250))
+    ground[180:360], ground[360:] = (120, 250, 240), 255
+    ground[188:194], ground[344:350] = 255, 255
+    ground[:34] = (40, 60, 70)
+    cv2.putText(ground, "A HUSKY", (20, 26), 0, 0.8, (255, 255, 255), 2, cv2.LINE_AA)
+    return ground
+
+
+def facets() -> Picture:
+    """Return bands with pale polygons, and one ellipse of ground under all feet."""
+    ground = bands()
+    for color, corners in (
+        ((198, 255, 249), [(0, 34), (300, 34), (260, 170), (0, 180)]),
+        ((255, 255, 255), [(700, 34), (900, 34), (930, 180), (640, 180)]),
+        ((211, 255, 251), [(0, 360), (420, 360), (300, 520), (0, 520)]),
+        ((230, 240, 255), [(800, 520), (900, 360), (1200, 360), (1200, 420)]),
+    ):
+        cv2.fillPoly(ground, [np.array(corners)], color, cv2.LINE_AA)
+    cv2.ellipse(ground, (600, 478), (570, 26), 0, 0, 360, (64, 224, 208), -1, cv2.LINE_AA)
+    return ground
+
+
+def panel_with_swatches(line: int = 0) -> Picture:
+    """Return a panel that ends above the feet, with swatches where its corner is cut out."""
+    ground = large_plain((241, 255, 217))
+    outline = [(60, 90), (1140, 90), (1140, 330), (1060, 330), (1060, 450), (60, 450)]
+    cv2.fillPoly(ground, [np.array(outline)], (210, 243, 154))
+    if line:
+        cv2.polylines(ground, [np.array(outline)], True, (20, 20, 20), line)
+    for k, color in enumerate(((200, 60, 60), (60, 60, 200), (240, 220, 90))):
+        cv2.circle(ground, (1110, 370 + 30 * k), 12, color, -1, cv2.LINE_AA)
+    return ground
+
+
+def band_behind_the_bodies() -> Picture:
+    ground = large_plain(255)
+    ground[170:330] = (200, 220, 250)
+    return ground
+
+
+def two_panels() -> Picture:
+    ground = large_plain((241, 255, 217))
+    ground[90:450, 30:590], ground[90:450, 620:1170] = (210, 243, 154), (200, 220, 250)
+    return ground
+
+
+def large_plain(color: int | tuple[int, int, int]) -> Picture:
+    return plain(color, 1200, 520)
+
+
+def large_figures(
+    ground: Picture, *, outlined: bool = True, white: bool = False
+) -> tuple[Picture, Picture]:
+    """Return a picture with four figures on it that are twice as large, and their mask."""
+    picture, mask = ground.copy(), np.zeros(ground.shape[:2], np.uint8)
+    parts = (((-16, 380), (28, 96), BROWN), ((0, 260), (60, 120), TEAL), ((0, 120), (52, 60), SKIN))
+    for k in range(FIGURES):
+        for (x, y), axes, color in parts:
+            center, paint = (150 + 300 * k + x, y), (255, 255, 255) if white else color
+            for target, fill, edge in ((picture, paint, BLACK), (mask, 1, 1)):
+                cv2.ellipse(target, center, axes, 0, 0, 360, fill, -1)
+                if outlined:
+                    cv2.ellipse(target, center, axes, 0, 0, 360, edge, 5)
+    return picture, mask > 0
+
+
+BACKDROPS = {
+    "bands": bands,
+    "facets": facets,
+    "panel": panel_with_swatches,
+    "outlined panel": lambda: panel_with_swatches(4),
+    "band": band_behind_the_bodies,
+    "two panels": two_panels,
+}
+
+
+@pytest.mark.parametrize("name", BACKDROPS)
+@pytest.mark.parametrize("outlined", [True, False])
+def test_graphic_backdrops(name: str, outlined: bool) -> None:
+    picture, truth = large_figures(BACKDROPS[name](), outlined=outlined)
+    assert_right(opaque(picture), truth)
+
+
+@pytest.mark.parametrize("name", ["bands", "facets"])
+def test_white_figures_are_no_part_of_a_white_backdrop(name: str) -> None:
+    picture, truth = large_figures(BACKDROPS[name](), white=True)
+    assert_right(opaque(picture), truth)
+    assert_right(opaque(jpeg(picture, 88)), truth)
+
+
+def blocky_figures(ground: Picture) -> tuple[Picture, Picture]:
+    """Return a picture with four figures of rectangles without outlines, and their mask."""
+    picture, mask = ground.copy(), np.zeros(ground.shape[:2], bool)
+    shirt, trousers = (60, 110, 200), (40, 40, 120)
+    for k in range(FIGURES):
+        middle = 150 + 300 * k
+        for left, right, top, bottom, color in (
+            (-45, 45, 130, 300, shirt),
+            (-25, 25, 150, 280, (255, 255, 255)),
+            (-40, 40, 40, 130, SKIN),
+            (-75, -45, 130, 310, SKIN),
+            (45, 75, 130, 310, SKIN),
+            (-45, 45, 300, 480, trousers),
+        ):
+            part = slice(top, bottom), slice(middle + left, middle + right)
+            picture[part], mask[part] = color, True
+    return picture, mask
+
+
+@pytest.mark.parametrize("name", ["bands", "facets", "paper"])
+def test_blocky_figures_are_no_panels(name: str) -> None:
+    ground = large_plain(255) if name == "paper" else BACKDROPS[name]()
+    picture, truth = blocky_figures(ground)
+    found = assert_right(opaque(picture), truth)
+    assert not found.warnings
+
+
+def test_a_drawn_frame_is_no_panel() -> None:
+    picture, truth = large_figures(large_plain((242, 237, 223)))
+    for inset in (10, 16):
+        cv2.rectangle(picture, (inset, inset), (1199 - inset, 519 - inset), (30, 50, 120), 4)
+    assert fit_backdrop(picture, ring_of(520, 1200), only_panels=True) is None
+    assert_right(opaque(picture), truth)
+
+
+def test_zones_meet_in_straight_steps() -> None:
+    picture = plain(200, 300, 300)
+    picture[150:] = 120
+    cv2.circle(picture, (150, 80), 45, (40, 40, 40), -1)
+    zones = find_zones(picture, 1.0, 0.001)
+    upper, lower, disc = (int(zones.labels[y, x]) for y, x in ((10, 10), (290, 10), (80, 150)))
+    met = find_meetings(zones, zones.colors(picture).astype(np.uint8)[zones.grown], picture)
+    assert met.straight[lower, upper] >= 0.9 * met.length[lower, upper] > 0
+    assert met.length[disc, upper] > 0
+    assert met.straight[disc, upper] == 0
