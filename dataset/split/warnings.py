@@ -8,7 +8,7 @@ from jaxtyping import UInt8
 
 from toonset.dataset.split.background import SURE_ENOUGH, Background, ring_of
 from toonset.dataset.split.figures.blobs import Blobs, find_blobs, shared_colors
-from toonset.dataset.split.figures.grouping import LEAST_PART
+from toonset.dataset.split.figures.grouping import LEAST_PART, NEAR
 from toonset.dataset.split.figures.open_outlines import LINE, Gap
 from toonset.dataset.split.figures.rows import LEAST_ROW, LOWEST, OFF_ROW, likeness, outline
 from toonset.dataset.split.pages import Pages
@@ -95,6 +95,7 @@ def figure_warnings(
         *_whole_page(found, views, rgba),
         *_panels(views, rgba),
         *_near_parts(found, views),
+        *_single_parts(found, views),
         *_other_groups(found),
         *_like_views(found, views, rgba),
         *_scattered_strokes(found, views),
@@ -286,6 +287,22 @@ def _near_parts(found: SheetLayout, views: list[View]) -> list[str]:
                     f"a part at {x}, {y} went to view {views[figure].name}: "
                     f"is it a part of {views[other].name}, which is near, too?"
                 )
+    return said
+
+
+def _single_parts(found: SheetLayout, views: list[View]) -> list[str]:
+    """Return a line for every part far beside its body that has no like: it may be a prop."""
+    parts, bodies = _parts_apart(found)
+    said = []
+    for number, figure in parts:
+        gap = _gap(found.blobs, number, bodies[figure])
+        x, y, _, _ = (int(value) * found.cell_px for value in found.blobs.boxes[number])
+        beside = NEAR < gap < np.inf
+        if beside and not any(n != number and _is_like(found.blobs, number, n) for n, _ in parts):
+            said.append(
+                f"a thing at {x}, {y} apart from view {views[figure].name} was taken for its part: "
+                "is it one?"
+            )
     return said
 
 
