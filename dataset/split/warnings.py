@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import cv2
 import numpy as np
 from jaxtyping import UInt8
@@ -23,6 +25,7 @@ PROPORTIONS = 1.2  # times the widest view's, or less than its inverse of the na
 ALIKE = 0.6  # of the colours that the views share among each other: less is another thing
 BROAD = 1.15  # times its own height: wider than arms reach
 NEARER = 1.2  # times the gap between parts and their bodies: so near a part may be another's
+IN_EACH_OTHER = 0.45  # of the smaller one's box
 GREY = 24  # levels between a colour's channels: ink and its soft edges have less
 COLORED = 0.3  # of a view: it is painted
 SAME_POSE = 0.65  # IoU of its outline with the most like other one
@@ -91,6 +94,7 @@ def figure_warnings(
         *_open_outlines(found, views),
         *_wide_views(views),
         *_off_row(views),
+        *_one_in_another(views),
         *_painted_alone(views),
         *_whole_page(found, views, rgba),
         *_panels(views, rgba),
@@ -204,6 +208,20 @@ def _off_row(views: list[View]) -> list[str]:
                 f"view {view.name} stands {'lower' if heads < 0 else 'higher'} than the rest of "
                 "its row: is it another drawing?"
             )
+    return said
+
+
+def _one_in_another(views: list[View]) -> list[str]:
+    """Return a line for every two views whose boxes lie far in each other: one was cut in two."""
+    said = []
+    for one, other in combinations(views, 2):
+        (x, y, width, height), (left, top, wide, tall) = one.figure_box, other.figure_box
+        across = min(x + width, left + wide) - max(x, left)
+        down = min(y + height, top + tall) - max(y, top)
+        if min(across, down) > 0 and across * down > IN_EACH_OTHER * min(
+            width * height, wide * tall
+        ):
+            said.append(f"views {one.name} and {other.name} lie in each other: are they two?")
     return said
 
 

@@ -164,3 +164,14 @@ def test_one_painted_view_among_line_drawings_is_doubted_in_another_pose(
         cv2.ellipse(page, (x, 200), axes, tilt, 0, 360, (10, 10, 10, 255), 4)
     said = any("alone is painted" in line for line in split_picture(page).warnings)
     assert said is doubted
+
+
+@pytest.mark.parametrize(("shift", "doubted"), [(70, True), (140, False)])
+def test_views_whose_boxes_lie_in_each_other_are_doubted(shift: int, doubted: bool) -> None:
+    page = np.full((420, 700, 4), 255, np.uint8)
+    for x, y in ((200, 40), (200 + shift, 40)):
+        corners = np.array([(x, y), (x + 40, y), (x + 160, 380), (x + 120, 380)])
+        cv2.fillPoly(page, [corners], (200, 60, 40, 255))
+    found = split_picture(page)
+    assert len(found.views) == 2
+    assert any("lie in each other" in line for line in found.warnings) is doubted
