@@ -198,7 +198,7 @@ def _beside(
         for levels in (values[rows, columns], beside, picture[rows, columns])
     )
     low, high = np.minimum(here, there) - BETWEEN, np.maximum(here, there) + BETWEEN
-    return others, ((color >= low) & (color <= high)).all(axis=1)
+    return others, np.asarray(np.all((color >= low) & (color <= high), axis=1))
 
 
 def _edges(

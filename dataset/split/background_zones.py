@@ -302,6 +302,6 @@ def _plate(
     reach = np.ones((2 * STEP_PX + 1,) * 2, np.uint8)
     low = cv2.erode(np.where(known[..., None], plate, np.uint8(255)), reach)
     high = cv2.dilate(np.where(known[..., None], plate, np.uint8(0)), reach)
-    met = (high.astype(np.int16) - low > CLOSE).any(axis=2)
+    met = cv2.subtract(high, low).max(axis=2) > CLOSE
     between = np.clip(rgb, low, np.maximum(low, high))
     return np.where(met[..., None], between, plate)

@@ -426,12 +426,12 @@ def test_places_are_those_of_the_straightened_picture(tmp_path: Path) -> None:
     assert "seen from straight above" in source.remarks[0]
     assert source.size_wh == photo.shape[1::-1]
     assert len(sheet.views) == FIGURES
+    assert picture is not None
     for view in sheet.views:
         left, top, width, height = view.box
         shown = picture[top : top + height, left : left + width, :3][view.mask]
-        assert (
-            np.abs(shown.astype(int) - view.rgba[view.mask][:, :3]).mean() < 4
-        )  # rims are without paper
+        away = np.abs(shown.astype(int) - view.rgba[view.mask][:, :3])
+        assert away.mean() < 4  # rims are without paper
     shown = cv2.imdecode(
         np.frombuffer(base64.b64decode(sheet_url(file, sheet).partition(",")[2]), np.uint8), 1
     )
