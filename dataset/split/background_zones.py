@@ -133,9 +133,8 @@ def _of_one_color(
 
     Figures part a zone into several, of which some do not reach the border.
     """
-    areas = np.bincount(zones.labels.ravel())
-    shares = np.bincount(zones.labels[at_border], minlength=len(areas)) / at_border.sum()
-    numbers = np.flatnonzero((shares > 0) | (areas >= LEAST_PATCH * zones.labels.size))
+    shares = np.bincount(zones.labels[at_border], minlength=zones.count + 1) / at_border.sum()
+    numbers = np.flatnonzero((shares > 0) | (zones.areas >= LEAST_PATCH * zones.labels.size))
     numbers = numbers[numbers > 0][np.argsort(-shares[numbers[numbers > 0]], kind="stable")]
     groups: list[list[int]] = []
     colors: list[np.ndarray] = []

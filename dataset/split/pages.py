@@ -50,7 +50,7 @@ PLAIN_PANEL = 0.4  # of its inner edge that smooth zones take: no picture
 SMOOTH = 0.95  # of these in the colours of one ground
 UPRIGHT_DEG = 0.5
 UPRIGHT = 0.97  # of the smallest rectangle: less is a perspective
-FOCAL = 0.75  # of a photograph's longer side: a telephone's lens
+FOCAL = 0.75  # of a photograph's longer side: a phone's lens
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +158,7 @@ def _corners(hull: Int[np.ndarray, "corners 1 2"]) -> Float[np.ndarray, "4 2"] |
 def _rectangle(
     corners: Float[np.ndarray, "4 2"], size_wh: Int[np.ndarray, " 2"]
 ) -> Float[np.ndarray, "4 2"]:
-    """Return the upright rectangle, of the same area and middle, that four corners are seen of."""
+    """Return the upright rectangle of the same area and middle whose corners are seen there."""
     focal = FOCAL * size_wh.max()
     rays = np.column_stack([(corners - (size_wh - 1) / 2) / focal, np.ones(4)])
     left_top, right_top, right_bottom, left_bottom = rays

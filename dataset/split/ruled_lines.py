@@ -242,7 +242,7 @@ def _ends_with(line: Line, other: Line) -> bool:
 
 
 def _is_on(line: Line, other: Line) -> bool:
-    """Return whether two lines share rows."""
+    """Return whether two lines share rows, or touch."""
     return line.first <= other.last + 1 and other.first <= line.last + 1
 
 

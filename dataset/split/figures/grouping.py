@@ -23,7 +23,6 @@ from toonset.dataset.split.figures.printed_palette import (
 from toonset.dataset.split.figures.text_and_swatches import find_letters, find_swatches
 
 WITHIN = 0.5  # of a patch that lies in a figure's box: its part
-ASIDE = 0.3  # of the same: with less it stands beside the figure
 NEAR = 0.02  # of the figure's height: a part this near to the figure is the figure's
 ABOVE = 0.08  # of the figure's height: so near something above may be its part
 BESIDE = 0.08  # of the figure's height: so near something beside it may be, in its colours
@@ -190,8 +189,8 @@ def _is_part(blobs: Blobs, number: int, body: int, gap: float, rgb: np.ndarray) 
         return False
     middle = own[0] + own[2] / 2
     above = main[0] <= middle <= main[0] + main[2]
-    aside = _share_within(own, main) < ASIDE
-    if aside and not above and area > HAND and gap > TOUCHING * main[3]:
+    aside = own[0] >= main[0] + main[2] or own[0] + own[2] <= main[0]
+    if aside and area > HAND and gap > TOUCHING * main[3]:
         return False
     lettering = _is_lettering(blobs, number, body, rgb)
     below = own[1] >= main[1] + main[3]

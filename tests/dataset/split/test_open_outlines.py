@@ -91,7 +91,7 @@ def test_the_gap_between_arm_and_body_stays_open_on_transparency() -> None:
 def test_a_painted_figure_whose_hand_nearly_touches_its_hip_keeps_the_gap() -> None:
     canvas = np.full((300, 220, 4), 255, np.uint8)
     cv2.ellipse(canvas, (90, 150), (40, 120), 0, 0, 360, (40, 90, 200, 255), -1)
-    cv2.ellipse(canvas, (130, 150), (45, 60), 0, -100, 140, (40, 90, 200, 255), 24)
+    cv2.ellipse(canvas, (130, 150), (45, 60), 0, -70, 140, (40, 90, 200, 255), 22)
     cv2.ellipse(canvas, (90, 150), (42, 122), 0, 10, 70, (255, 255, 255, 255), 3)  # the hand is off
     found = split_picture(canvas)
     painted = (canvas[..., :3] != 255).any(axis=2)
