@@ -171,7 +171,9 @@ def add_drawings(training: Training, scene: Scene) -> TrainedField:
         return render(baked, camera).depth
 
     seen, drawn = training.seen, add_mirrored_views(scene, training.symmetry)
-    found = drawings_of(seen, drawn, depth_of, ready.shape, differences(seen), bent=ready.bent)
+    found = drawings_of(
+        seen, drawn, depth_of, ready.shape, differences(seen), training.result.hull, bent=ready.bent
+    )
     result = replace(training.result, drawings=found)
     keep(result, baked)
     return result

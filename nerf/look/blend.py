@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from toonset.camera import Camera
-from toonset.nerf.hull.mannequin_shape import FINER, ShapeView
+from toonset.nerf.hull.mannequin_shape import FINER, Shape, ShapeView
 from toonset.nerf.look.choose import OTHER, Look, choose, filled_from, mixed
 from toonset.nerf.look.drawings import (
     CRUMB,
@@ -50,6 +50,7 @@ SAME = 1e-9  # radians: seen from one side
 # Radians off a drawing's own camera, in which the view becomes the drawing; where the others were
 # made to agree and it was bent or moved for that, the less, the steadier
 OWN, OWN_BENT = 0.12, 0.04
+BEYOND = 0.01  # of the figure's height, beside the nearest drawing: what lies there is not shown
 AFLOAT = 0.25  # share of what floats beside a figure: so much of it has to in a drawing, too
 DRAWN, MIRRORED, GUESSED = 0, 1, 2  # where a pixel's paint comes from
 SOURCES = ("drawn", "mirrored", "guessed")
@@ -160,6 +161,9 @@ def blend_view(drawings: Drawings, view: Geometry) -> DrawnView:
     shape, room = drawings.shape, int(np.ceil(ROOM * drawings.height * view.camera.scale)) + 1
     box = _box(view.alpha > 0, room) if shape is None else shape.box(view.camera)
     own, share = _own_part(fitting, view.camera)
+    limbs = _limbs(fitting, view.camera)
+    if limbs is not None:
+        box = _joined(box, limbs.box(view.camera))
     if share > 0:  # a drawing may show more than the surface has
         box = _joined(box, _own_box(fitting, own, view.camera))
     if box is None:
@@ -168,6 +172,12 @@ def blend_view(drawings: Drawings, view: Geometry) -> DrawnView:
     for name in ("rgb", "alpha", "ink", "labels", "paint", "source"):
         getattr(result, name)[box] = getattr(part, name)
     return result
+
+
+def _limbs(drawings: Drawings, camera: Camera) -> Shape | None:
+    """Return what the drawing nearest to a view shows and the field lacks."""
+    first, _, _ = flanking([one.camera for one in drawings.views], camera)
+    return drawings.views[first].limbs
 
 
 def _own_part(drawings: Drawings, camera: Camera) -> tuple[int, np.float32]:
@@ -218,16 +228,19 @@ def _box(mask: Bool[np.ndarray, "height width"], room: int) -> Box | None:
 
 def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
     camera, figure_px = view.camera, drawings.height * view.camera.scale
-    sight = None
+    flank = flanking([texture.camera for texture in drawings.textures], camera)
+    sight, limb = None, np.zeros(view.alpha.shape, dtype=bool)
     if drawings.shape is not None:
         sight = drawings.shape.seen(camera, normals=drawings.shade is not None)
         view = replace(view, alpha=sight.alpha, depth=sight.depth)
         depth = crisp_depth(view.depth)
     else:
+        view, limb = _posed(drawings, flank[0], view)
         depth = smooth_surface(view.depth, drawings.height, figure_px)
     points = camera.unproject(camera.pixel_grid(), depth)
-    flank = flanking([texture.camera for texture in drawings.textures], camera)
     numbers, looks = _looks(drawings, camera, points, flank)
+    if limb.any():  # which no other drawing shows
+        looks = [looks[0], *(replace(one, seen=one.seen & ~limb) for one in looks[1:])]
     own, part = _own_part(drawings, camera)
     whole = np.zeros((*depth.shape, 4), np.float32)
     if part > 0:
@@ -257,6 +270,30 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
     if part == 1:
         source = np.full(source.shape, MIRRORED if drawings.views[own].mirrored else DRAWN)
     return DrawnView(rgb, alpha, ink, labels, color, source.astype(np.uint8))
+
+
+def _posed(
+    drawings: Drawings, number: int, view: Geometry
+) -> tuple[Geometry, Bool[np.ndarray, "h w"]]:
+    """Return a view with its limbs as a drawing has them, and the pixels of those it lacked."""
+    texture, limbs, camera = drawings.textures[number], drawings.views[number].limbs, view.camera
+    there = np.isfinite(view.depth)
+    if drawings.views[number].mirrored:
+        return view, np.zeros(there.shape, dtype=bool)
+    points = camera.unproject(camera.pixel_grid(), np.where(there, view.depth, 0))
+    places, _, _ = places_in(texture.camera, points)
+    most = BEYOND * texture.figure_px
+    off = there & (sample_picture(texture.beyond, places, cv2.INTER_LINEAR) > most)
+    if off.any():
+        off = dilate(off, 2) & (off | ~there)
+        alpha, depth = np.where(off, 0, view.alpha), np.where(off, np.nan, view.depth)
+        view = replace(view, alpha=alpha, depth=depth)
+    if limbs is None:
+        return view, np.zeros(there.shape, dtype=bool)
+    own = limbs.seen(camera)
+    added = np.isfinite(own.depth) & ~(view.depth < own.depth)
+    alpha, depth = np.maximum(view.alpha, own.alpha), np.fmin(view.depth, own.depth)
+    return replace(view, alpha=alpha, depth=depth), added
 
 
 def _looks(

@@ -10,14 +10,18 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
+from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.silhouettes.mask import has_figure, mask_of
-from toonset.nerf.hull.mannequin_shape import Shape
+from toonset.nerf.hull.hull import Hull
+from toonset.nerf.hull.mannequin_shape import Shape, shape_of
 from toonset.nerf.kernels.threads import side_by_side
 from toonset.nerf.look.drawings import STEP, Drawing, Drawings, Original, levels_of
 from toonset.nerf.look.flat_paint import flat_paint
 from toonset.nerf.look.outline import outline_of
 from toonset.nerf.look.paint_flow import Depths, pair_flows
+from toonset.nerf.sections.own_limbs import own_limbs
+from toonset.nerf.sections.roles import at_eye_level
 
 COARSE, MOST_COLORS = 32, 12  # levels of a channel that count as one; colours
 
@@ -28,6 +32,7 @@ def drawings_of(
     depth_of: Depths,
     shape: Shape | None = None,
     differences: Sequence[Bool[np.ndarray, "height width"] | None] = (),
+    hull: Hull | None = None,
     *,
     bent: bool,
 ) -> Drawings | None:
@@ -40,6 +45,7 @@ def drawings_of(
         shape: the mannequin's, where it is the character's: the surface is its own then.
         differences: per drawing along the mirror plane where it shows that left and right differ,
             None of others; empty where nothing is mirrored.
+        hull: that the field lies in.
         bent: whether they were bent.
     """
     known = [*differences, *[None] * (len(ready.frames) - len(differences))]
@@ -55,6 +61,14 @@ def drawings_of(
         depths = [sight.depth for sight in sights]
     else:
         depths = side_by_side([partial(depth_of, frame.camera) for frame in frames])
+    limbs: list[Shape | None] = [None] * len(frames)
+    if shape is None and hull is not None:
+        for number, (own, denied) in enumerate(_own_limbs(frames, hull, depth_of)):
+            limbs[number] = own
+            if denied is not None:
+                depths[number] = np.where(denied, np.nan, depths[number])
+            if own is not None:
+                depths[number] = np.fmin(depths[number], own.seen(frames[number].camera).depth)
     seen = np.concatenate([depth[np.isfinite(depth)] for depth in depths])
     if not len(seen):
         return None
@@ -72,13 +86,32 @@ def drawings_of(
             levels_of(depth, extent) if shape is None else None,
             frame.mirrored,
             _original(frame, own),
+            limb,
         )
-        for (frame, own, _), paint, depth in zip(rows, flat.paints, shown, strict=True)
+        for (frame, own, _), paint, depth, limb in zip(rows, flat.paints, shown, limbs, strict=True)
     )
     palette = ready.palette if ready.palette is not None else _common_colors(views)
     found = Drawings(views, (), line, line, palette, height, extent, bent, shape)
     found = replace(found, steps=flat.steps, shade=flat.shade, shadow=ready.shadow)
     return found.with_flows(pair_flows(found, depth_of))
+
+
+def _own_limbs(
+    frames: Sequence[Frame], hull: Hull, depth_of: Depths
+) -> list[tuple[Shape | None, Bool[np.ndarray, "height width"] | None]]:
+    """Return per drawing what it shows and the field lacks, and where the field shows too much."""
+    cameras = [frame.camera for frame in frames]
+    if len(frames) < 2 or not at_eye_level(cameras):
+        return [(None, None)] * len(frames)
+
+    def shows(camera: Camera) -> Bool[np.ndarray, "height width"]:
+        return np.isfinite(depth_of(camera))
+
+    found = own_limbs(frames, hull.support.numpy(), hull.low, hull.voxel, shows)
+    return [
+        (limbs and limbs.mesh and shape_of(limbs.mesh, [camera]), limbs and limbs.denied)
+        for limbs, camera in zip(found, cameras, strict=True)
+    ]
 
 
 def _denied_places(

@@ -59,6 +59,7 @@ class Drawing:
             mannequin's.
         mirrored: it is the mirror image of another.
         original: how it was drawn; None: just so.
+        limbs: what it shows and the field lacks, for views near it; None: nothing.
     """
 
     camera: Camera
@@ -67,6 +68,7 @@ class Drawing:
     levels: UInt8[np.ndarray, "height width"] | None
     mirrored: bool = False
     original: Original | None = None
+    limbs: Shape | None = None
 
     @property
     def as_drawn(self) -> Original:
@@ -237,6 +239,7 @@ class Texture:
             just behind the steps of a known shape.
         to_edge: (height, width) pixels to the outline or the nearest step in depth.
         rim: what its outline has beyond the surface's.
+        beyond: (height, width) pixels to the drawing and its surface.
         pen: width in pixels and colour of its lines; None: there are none.
         figure_px: height of the figure.
         in_own: (height, width, 3) the paint in the artist's colours.
@@ -251,6 +254,7 @@ class Texture:
     far: Float[np.ndarray, "height width"]
     to_edge: Float[np.ndarray, "height width"]
     rim: Rim
+    beyond: Float[np.ndarray, "height width"]
     pen: tuple[float, tuple[int, int, int]] | None
     figure_px: float
     in_own: UInt8[np.ndarray, "height width 3"]
@@ -306,7 +310,7 @@ def _half(view: Drawing) -> Drawing:
     own = _half_size(Original(view.camera, view.rgba))
     original = None if view.original is None else _half_size(view.original)
     flat = _rounded(_in_blocks(paint))
-    return Drawing(own.camera, own.rgba, flat, levels, view.mirrored, original)
+    return Drawing(own.camera, own.rgba, flat, levels, view.mirrored, original, view.limbs)
 
 
 def _half_size(picture: Original) -> Original:
@@ -374,6 +378,7 @@ def _texture(
         far.astype(np.float32),
         to_edge.astype(np.float32),
         _rim(view, depth, drawings),
+        distance_to(mask_of(view.rgba) | np.isfinite(depth)).astype(np.float32),
         (drawings.pen.width_px, drawings.pen.rgb) if drawings.pen else None,
         height * view.camera.scale,
         in_own,

@@ -25,7 +25,7 @@ from toonset.dataset.silhouettes.mask import mask_of
 from toonset.nerf.sections.drawing import mirrored_camera
 from toonset.symmetric import Symmetric
 
-FACING = math.radians(12)  # between the mirror plane and a drawing that shows both sides
+FACING = math.radians(20)  # between the mirror plane and a drawing that shows both sides
 NEW = math.radians(20)  # a mirrored drawing this near to a drawn one adds nothing
 # Of what both halves of a facing drawing cover; 35 fronts and backs have .90 and more, halves in
 # two colours less than .3 (docs/decisions.md)
@@ -83,7 +83,8 @@ def find_symmetry(scene: Scene, asked: Symmetric = "auto") -> Symmetry | None:
         return None
     shown = [frame for frame in scene.frames if mask_of(frame.rgba).any()]
     cameras = [frame.camera for frame in shown]
-    new = [frame for frame in shown if not _seen(mirrored(frame, 0.0).camera, cameras)]
+    aside = [frame for frame in shown if not faces(frame.camera)]
+    new = [frame for frame in aside if not _seen(mirrored(frame, 0.0).camera, cameras)]
     if not new:
         return None
     halves = [(frame, Halves.of(frame.rgba)) for frame in shown if faces(frame.camera)]

@@ -6,7 +6,9 @@
     drawings.safetensors    flow.0   (h, w, 2) how far paint lies apart, of the first pair, and on
                             depth    (height, all widths) levels of the field's surface in each; or
                             places   (v, 3) the mannequin's vertices, in steps of a grid, and
-                            faces    (f, 3) its triangles, where it is the surface
+                            faces    (f, 3) its triangles, where it is the surface;
+                            limbs.0.places, limbs.0.faces: the same of limbs that the first drawing
+                            alone has, and on
 
 Their cameras, the pairs, outline, lines and shadow are in config.json under `field.drawings`.
 """
@@ -112,6 +114,19 @@ class ShapeRecord(BaseModel):
     beyond: float = Field(ge=0, le=1e9)
 
 
+class LimbsRecord(BaseModel):
+    """Limbs that one drawing alone has: its number among the drawings, and their grid."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+    number: Count
+    shape: ShapeRecord
+
+    @property
+    def prefix(self) -> str:
+        """Return how the names of its tensors begin."""
+        return f"limbs.{self.number}."
+
+
 class DrawingsRecord(BaseModel):
     """Record of `Drawings` in config.json."""
 
@@ -127,6 +142,7 @@ class DrawingsRecord(BaseModel):
     steps: StepsRecord | None
     shade: ShadeRecord | None
     shadow: ShadowRecord | None = None
+    limbs: list[LimbsRecord] = Field(default=[], max_length=MOST_VIEWS)
     mirrored: list[Count] = Field(default=[], max_length=MOST_VIEWS)
     originals: list[OriginalRecord] = Field(default=[], max_length=MOST_VIEWS)
 
@@ -148,6 +164,11 @@ class DrawingsRecord(BaseModel):
                 "steps": drawings.steps and asdict(drawings.steps),
                 "shade": drawings.shade and asdict(drawings.shade),
                 "shadow": drawings.shadow and asdict(drawings.shadow),
+                "limbs": [
+                    {"number": i, "shape": _where(view.limbs)}
+                    for i, view in enumerate(drawings.views)
+                    if view.limbs
+                ],
                 "mirrored": [i for i, view in enumerate(drawings.views) if view.mirrored],
                 "originals": [
                     {"number": i, "camera": NativeCamera.of(view.original.camera)}
@@ -175,9 +196,16 @@ def write_drawings(folder: Path, drawings: Drawings) -> None:
         levels = [view.levels for view in views if view.levels is not None]
         tensors["depth"] = _side_by_side(levels)
     else:
-        tensors["places"] = drawings.shape.places
-        tensors["faces"] = drawings.shape.faces.astype(np.uint16)
+        tensors |= _triangles(drawings.shape)
+    for i, view in enumerate(views):
+        if view.limbs:
+            tensors |= _triangles(view.limbs, f"limbs.{i}.")
     write_bytes(folder / SURFACES, save({k: torch.from_numpy(v) for k, v in tensors.items()}))
+
+
+def _triangles(shape: Shape, prefix: str = "") -> dict[str, np.ndarray]:
+    faces = shape.faces.astype(np.uint16)
+    return {f"{prefix}places": shape.places, f"{prefix}faces": faces}
 
 
 def read_drawings(folder: Path, record: DrawingsRecord) -> Drawings:
@@ -214,8 +242,13 @@ def read_drawings(folder: Path, record: DrawingsRecord) -> Drawings:
     if shape is None:
         levels = [*_apart(found["depth"].numpy(), cameras)]
     parts = zip(cameras, rgba, paint, levels, strict=True)
+    limbs = {
+        own.number: _shape(own.shape, found, file, f"limbs.{own.number}.") for own in record.limbs
+    }
     views = tuple(
-        Drawing(camera, own, flat[..., :3], level, i in record.mirrored, originals.get(i))
+        Drawing(
+            camera, own, flat[..., :3], level, i in record.mirrored, originals.get(i), limbs.get(i)
+        )
         for i, (camera, own, flat, level) in enumerate(parts)
     )
     line = None if record.outline is None else Outline(**record.outline.model_dump())
@@ -278,8 +311,10 @@ def _check_tensors(
     there = {name: (tuple(values.shape), values.dtype) for name, values in found.items()}
     if record.shape is None:
         wanted["depth"] = (_whole(cameras), torch.uint8)
-    else:
-        for name, most in (("places", MOST_STEPS), ("faces", MOST_FACES)):
+    shapes = [own.prefix for own in record.limbs]
+    for prefix in shapes if record.shape is None else ["", *shapes]:
+        for kind, most in (("places", MOST_STEPS), ("faces", MOST_FACES)):
+            name = prefix + kind
             rows = found[name].shape[0] if name in found and found[name].dim() else 0
             wanted[name] = ((min(max(1, rows), most), 3), torch.uint16)
     if there != wanted:
@@ -291,8 +326,9 @@ def _check_tensors(
         )
 
 
-def _shape(record: ShapeRecord, found: Mapping[str, Tensor], file: Path) -> Shape:
-    places, faces = found["places"].numpy(), found["faces"].numpy().astype(np.int64)
+def _shape(record: ShapeRecord, found: Mapping[str, Tensor], file: Path, prefix: str = "") -> Shape:
+    places = found[f"{prefix}places"].numpy()
+    faces = found[f"{prefix}faces"].numpy().astype(np.int64)
     if faces.max() >= len(places):
         raise BundleError(f"{file}: faces name vertices that are not there; train again")
     return Shape(np.array(record.low), record.step, places, faces, record.beyond)

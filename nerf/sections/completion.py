@@ -62,11 +62,11 @@ def completed(
         plane_x: of the body's mirror plane; None: it has none.
     """
     for drawing in drawings:
-        missing = missing_parts(drawing, silhouette(grid, f, drawing))
+        missing = missing_parts(drawing.mask, silhouette(grid, f, drawing))
         if missing.sum() < LEAST_PX:
             continue
-        rivals = [other for other in everything if not _opposite(other, drawing)]
-        balls = _inflated(grid, f, drawing, missing, rivals)
+        rivals = rivals_of(drawing, everything)
+        balls = inflated(grid, f, drawing, missing, rivals)
         added = [balls] if plane_x is None else [balls, *_twins(balls, drawing, rivals, plane_x)]
         for part in added:
             inside = drawing.distance_at(grid.centres).reshape(grid.shape) - OVER_PX
@@ -104,24 +104,31 @@ class Balls:
         return f
 
 
-def missing_parts(drawing: Drawing, seen: Float[np.ndarray, "height width"]) -> Mask:
-    """Return the parts of a drawing that a body lacks.
+def missing_parts(
+    mask: Mask,
+    seen: Float[np.ndarray, "height width"],
+    cut_off: float = CUT_OFF,
+    least: float = LEAST_PART,
+) -> Mask:
+    """Return the parts of a mask that a body lacks.
 
     Args:
-        drawing: what should be there.
+        mask: what should be there.
         seen: the lowest f along each pixel's ray.
+        cut_off: of half the width of what a part belongs to, that it stands out.
+        least: of the mask's pixels: smaller parts are none.
     """
-    labels = parts(drawing.mask & (seen > BESIDE_PX))
+    labels = parts(mask & (seen > BESIDE_PX))
     sizes = np.bincount(labels.reshape(-1))
     reach = ndimage.maximum(seen, labels, np.arange(len(sizes)))
-    chosen = (reach > LACKING_PX) & (sizes > LEAST_PART * drawing.mask.sum())
-    wide = ndimage.median(thickness(drawing.mask)[0], labels, np.arange(len(sizes)))
-    chosen &= reach > CUT_OFF * wide  # else the outline is off, and nothing cut off
+    chosen = (reach > LACKING_PX) & (sizes > least * mask.sum())
+    wide = ndimage.median(thickness(mask)[0], labels, np.arange(len(sizes)))
+    chosen &= reach > cut_off * wide  # else the outline is off, and nothing cut off
     chosen[0] = False
     return chosen[labels]
 
 
-def _inflated(
+def inflated(
     grid: Grid, f: Volume, drawing: Drawing, missing: Mask, rivals: Sequence[Drawing]
 ) -> Balls:
     """Return the balls of a missing part, where the rivals object least."""
@@ -177,6 +184,11 @@ def _united(one: Volume, other: Volume) -> Volume:
     """Return the union of two bodies, without a crease where they meet."""
     fillet = (1 - np.abs(one - other) / FILLET_PX).clip(min=0)
     return np.minimum(one, other) - FILLET_PX / 4 * fillet**2
+
+
+def rivals_of(drawing: Drawing, everything: Sequence[Drawing]) -> list[Drawing]:
+    """Return the drawings of other silhouettes than one has."""
+    return [other for other in everything if not _opposite(other, drawing)]
 
 
 def _opposite(one: Drawing, other: Drawing) -> bool:

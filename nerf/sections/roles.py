@@ -60,10 +60,14 @@ def mirror_images(
 
 def wants_sections(cameras: Sequence[Camera]) -> bool:
     """Return whether drawings from here have sections, and a hull of them would be square."""
-    level = all(abs(camera.angles[1]) < EYE_LEVEL for camera in cameras)
     yaws = [yaw_of(camera) for camera in cameras]
     half = largest_gap(yaws, 2 * math.pi) > UNDRAWN
-    return level and largest_gap(yaws, math.pi) > (GAP_OF_HALF if half else GAP)
+    return at_eye_level(cameras) and largest_gap(yaws, math.pi) > (GAP_OF_HALF if half else GAP)
+
+
+def at_eye_level(cameras: Sequence[Camera]) -> bool:
+    """Return whether rows of all drawings show common heights."""
+    return all(abs(camera.angles[1]) < EYE_LEVEL for camera in cameras)
 
 
 def largest_gap(yaws: Sequence[float], turn: float) -> float:
