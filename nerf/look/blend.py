@@ -19,7 +19,7 @@ from jaxtyping import Bool, Float, UInt8
 
 from toonset.camera import Camera
 from toonset.nerf.hull.mannequin_shape import FINER, Shape, ShapeView
-from toonset.nerf.look.choose import OTHER, Look, choose, filled_from, mixed
+from toonset.nerf.look.choose import OTHER, Look, choose, filled_from, mixed, whole_groups
 from toonset.nerf.look.drawings import (
     CRUMB,
     STEP,
@@ -247,11 +247,15 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
         whole = _as_drawn(drawings.textures[own], points)
     scale = looks[0].scale
     alpha, ink = _outlined(drawings, view, looks, border, sight, whole[..., 3], part)
-    chosen, counts = choose(looks, alpha > 0, figure_px)
+    both = flank[0] != flank[1]
+    whole_ones = whole_groups(looks) if both and sight is None else []
+    chosen, counts = choose(looks, alpha > 0, figure_px, whole_ones)
     features: list[Stamp] = []
     if sight is None:
-        both, solid = flank[0] != flank[1], np.where(alpha > SOLID, chosen, -1)
-        features, without = stamps(looks, both, camera, solid, counts, depth, drawings.height)
+        solid = np.where(alpha > SOLID, chosen, -1)
+        features, without = stamps(
+            looks, both, camera, solid, counts, depth, drawings.height, whole_ones
+        )
         looks = [look.bare(those) for look, those in zip(looks, without, strict=True)]
     color, labels = mixed(looks, chosen, counts)
     shown = (chosen >= 0) & (alpha > 0)

@@ -30,6 +30,8 @@ SPREAD = 0.04  # sigma over which drawings are compared
 OTHER = 0.1  # share of a drawing that does not flank the view
 LEVEL = 2.0  # times as much as another: up to here the seam is free
 EVEN = 100.0  # squares of levels, as differences of colour: a pixel of seam, e times the count
+GRAZED = 0.1  # of the view's pixels per one of a drawing: what is seen more from aside is hidden
+OUTDONE, MOSTLY = 1e-6, 1e-3  # counts of others, and least one, where one drawing shows all
 ISLAND = 2e-3  # of the squared height: smaller patches of one drawing tear what they lie in
 ENOUGH_PX = 260  # height at which drawings are chosen well enough
 LIKE = 0.2  # of a channel: colours of two drawings that are nearer than this are averaged
@@ -94,6 +96,12 @@ class Look:
         return np.where(self._bare, bare, own)
 
     @cached_property
+    def group(self) -> Int[np.ndarray, "h w"]:
+        """Return the number of the group of features that every place lies in; 0: none."""
+        groups = self.texture.features.groups
+        return cv2.remap(groups, self.x, self.y, cv2.INTER_NEAREST) * self.seen
+
+    @cached_property
     def _bare(self) -> Mask:
         if self.without is None or not self.without.any():
             return np.zeros(self.x.shape, dtype=bool)
@@ -112,8 +120,63 @@ class Look:
         return (LEAST_TRUST + (1 - LEAST_TRUST) * inner) * (0.05 + 0.95 * square) * self.seen
 
 
+@dataclass(frozen=True)
+class Whole:
+    """Groups of features that both flanking drawings have, such as a face: one shows them.
+
+    Attributes:
+        leader: 0 or 1, which of the first two drawings does.
+        groups: of the first and of the second drawing.
+    """
+
+    leader: int
+    groups: tuple[tuple[int, ...], tuple[int, ...]]
+
+    def region(self, looks: Sequence[Look]) -> Mask:
+        """Return the pixels of the groups."""
+        first, second = (
+            np.isin(look.group, its) for look, its in zip(looks, self.groups, strict=False)
+        )
+        return np.asarray(first | second)
+
+
+def whole_groups(looks: Sequence[Look]) -> list[Whole]:
+    """Return the groups of features that both flanking drawings have, and who shows them.
+
+    It is the drawing that shows more of them, and less stretched, by its share of the view.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    own, its = (look.group for look in looks[:2])
+    pairs = np.unique(np.stack([own, its], axis=-1)[(own > 0) & (its > 0)], axis=0)
+    if not len(pairs):
+        return []
+    size = int(own.max()) + int(its.max()) + 2
+    first, second = pairs[:, 0], pairs[:, 1] + int(own.max()) + 1
+    joined = coo_matrix((np.ones(len(pairs)), (first, second)), shape=(size, size))
+    _, part = connected_components(joined, directed=False)
+    found = []
+    for number in np.unique(part[first]):
+        of = pairs[part[first] == number]
+        groups = tuple(np.unique(of[:, 0]).tolist()), tuple(np.unique(of[:, 1]).tolist())
+        shown = [look.share * _shown(look, ids) for look, ids in zip(looks, groups, strict=False)]
+        found.append(Whole(int(shown[1] > shown[0]), groups))
+    return found
+
+
+def _shown(look: Look, groups: Sequence[int]) -> float:
+    """Return the share of groups of features that a view shows, less where they are stretched."""
+    there = np.isin(look.group, groups)
+    drawn = np.count_nonzero(np.isin(look.texture.features.groups, groups))
+    across, down = np.gradient(look.x, axis=1)[there], np.gradient(look.y, axis=0)[there]
+    seen = float((across * down).clip(0, look.scale**-2 / GRAZED).sum())  # pixels of the drawing
+    shown = np.count_nonzero(there) / look.scale**2
+    return min(1.0, seen / max(drawn, 1)) * min(1.0, seen / max(shown, 1e-6))
+
+
 def choose(
-    looks: Sequence[Look], within: Mask, figure_px: float
+    looks: Sequence[Look], within: Mask, figure_px: float, whole: Sequence[Whole] = ()
 ) -> tuple[Int[np.ndarray, "h w"], Float[np.ndarray, "looks h w"]]:
     """Return the drawing that every pixel shows, -1 where none does; and what each counts.
 
@@ -124,12 +187,13 @@ def choose(
         looks: the nearest first.
         within: pixels of the figure, over which features go on.
         figure_px: height of the figure.
+        whole: groups of features that one drawing shows.
     """
     step = max(1, int(figure_px // ENOUGH_PX))
     if step == 1:
-        return _choose(looks, within, figure_px)
+        return _choose(looks, within, figure_px, whole)
     few = [look.every(step) for look in looks]
-    chosen, counts = _choose(few, within[::step, ::step], figure_px / step)
+    chosen, counts = _choose(few, within[::step, ::step], figure_px / step, whole)
     rows, columns = within.shape
     size = (chosen.shape[1] * step, chosen.shape[0] * step)
     finer = [cv2.resize(one, size, interpolation=cv2.INTER_LINEAR) for one in counts]
@@ -141,7 +205,7 @@ def choose(
 
 
 def _choose(
-    looks: Sequence[Look], within: Mask, figure_px: float
+    looks: Sequence[Look], within: Mask, figure_px: float, whole: Sequence[Whole]
 ) -> tuple[Int[np.ndarray, "h w"], Float[np.ndarray, "looks h w"]]:
     """Return what `choose` does, at the looks' own pixels."""
     trusts = [look.trust(figure_px) for look in looks]
@@ -153,6 +217,11 @@ def _choose(
         ]
     )
     counts += 1e-6 * np.stack([look.seen for look in looks])
+    for one in whole:
+        shown = one.region(looks) & looks[one.leader].seen
+        others = np.arange(len(looks)) != one.leader
+        counts[:, shown] *= np.where(others, OUTDONE, 1)[:, None]
+        counts[one.leader][shown] = np.maximum(counts[one.leader][shown], MOSTLY)
     best = np.where(counts.max(axis=0) > 0, counts.argmax(axis=0), -1)
     best = _without_islands(best, within, ISLAND * figure_px**2)
     if len(looks) == 1:

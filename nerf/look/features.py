@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -27,6 +28,13 @@ ROUND = 1.2  # times the pen's width: the line round a blot is its
 THICK = 2.0  # times the pen's width, from its edge: black so deep is paint
 INK_LIKE = 90  # of 255: such a colour is a line, which is no paint to go on with
 SAME_PAINT, ON_ONE = 0.15, 0.6  # of a channel; share of what is under a feature that is one paint
+import os
+
+NEAR, WIDE, BESIDE = (
+    float(os.environ.get("NEAR", ".03")),
+    float(os.environ.get("WIDE", ".5")),
+    float(os.environ.get("BESIDE", ".015")),
+)
 MATTE = (0.03, 0.06)  # of 1: what differs less from the paint without it shows none; all, by more
 
 Mask = Bool[np.ndarray, "height width"]
@@ -64,6 +72,7 @@ class Features:
         labels: (height, width) of this paint.
         found: the features, the first with number 1.
         blots: (height, width) blots of any form, at the outline too, and what is beside them.
+        groups: (height, width) of the group of features that a pixel lies in, from 1; 0: none.
     """
 
     numbers: Int16[np.ndarray, "height width"]
@@ -71,6 +80,13 @@ class Features:
     labels: UInt8[np.ndarray, "height width"]
     found: tuple[Feature, ...]
     blots: Mask
+    groups: Int16[np.ndarray, "height width"]
+
+    @cached_property
+    def group_of(self) -> list[int]:
+        """Return the group of every feature."""
+        middles = (np.rint(one.middle).astype(int) for one in self.found)
+        return [int(self.groups[y, x]) for x, y in middles]
 
 
 def features_of(
@@ -118,7 +134,7 @@ def features_of(
     bare = inside & (whole == 0)
     kept = bare & ~lined if (bare & ~lined).any() else bare
     if not kept.any() or not whole.any():
-        return Features(np.zeros_like(whole), paint, labels, (), beside)
+        return Features(np.zeros_like(whole), paint, labels, (), beside, np.zeros_like(whole))
     at = nearest(kept)
     off = whole > 0
     plain, ground = (np.where(off[..., None], one[at], one) for one in (paint, drawn))
@@ -127,7 +143,12 @@ def features_of(
     matte = cv2.GaussianBlur(cv2.dilate(matte, np.ones((3, 3), np.uint8)), (0, 0), 0.6) * off
     numbers, found = _numbered(drawn, whole, matte, ground)
     return Features(
-        numbers, plain.astype(np.float32), np.where(off, labels[at], labels), found, beside
+        numbers,
+        plain.astype(np.float32),
+        np.where(off, labels[at], labels),
+        found,
+        beside,
+        _grouped(found, inside, figure_px),
     )
 
 
@@ -154,6 +175,44 @@ def _numbered(
         found.append(Feature(down, across, own.astype(np.float32), middle, area, rgb))
         numbers[one] = len(found)
     return numbers[parts], tuple(found)
+
+
+def _grouped(
+    found: Sequence[Feature], inside: Mask, figure_px: float
+) -> Int16[np.ndarray, "height width"]:
+    """Return the number of the group whose hull, with what is beside it, a pixel lies in.
+
+    Features near each other are one group: a face is.
+    """
+    groups = np.zeros(inside.shape, np.int16)
+    marked = np.zeros(inside.shape, np.uint8)
+    for one in found:
+        near = round(figure_px * NEAR / 2 + WIDE * np.sqrt(one.area))
+        patch = np.pad((one.matte > 0.5).astype(np.uint8), near)
+        patch = cv2.dilate(patch, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * near + 1,) * 2))
+        top, left = one.rows.start - near, one.columns.start - near
+        rows = slice(max(0, top), min(len(marked), top + len(patch)))
+        columns = slice(max(0, left), min(marked.shape[1], left + patch.shape[1]))
+        part = patch[rows.start - top : rows.stop - top, columns.start - left : columns.stop - left]
+        marked[rows, columns] |= part
+    count, numbers = cv2.connectedComponents(marked, connectivity=8)
+    at = np.array([one.middle for one in found]).round().astype(int).reshape(-1, 2)
+    member = numbers[at[:, 1].clip(0, len(marked) - 1), at[:, 0].clip(0, marked.shape[1] - 1)]
+    for number in range(1, count):
+        own = [one for one, its in zip(found, member, strict=True) if its == number]
+        corners = [
+            (x, y)
+            for one in own
+            for x in (one.columns.start, one.columns.stop - 1)
+            for y in (one.rows.start, one.rows.stop - 1)
+        ]
+        if corners:
+            hull = np.zeros(inside.shape, np.uint8)
+            cv2.fillConvexPoly(hull, cv2.convexHull(np.array(corners, np.int32)), 1)
+            side = 2 * round(BESIDE * figure_px) + 1
+            hull = cv2.dilate(hull, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)))
+            groups[(hull > 0) & inside] = number
+    return groups
 
 
 def blots_of(
