@@ -50,7 +50,8 @@ SAME = 1e-9  # radians: seen from one side
 # Radians off a drawing's own camera, in which the view becomes the drawing; where the others were
 # made to agree and it was bent or moved for that, the less, the steadier
 OWN, OWN_BENT = 0.12, 0.04
-BEYOND = 0.01  # of the figure's height, beside the nearest drawing: what lies there is not shown
+# Of the height, and pixels, beside the nearest drawing: what lies farther from it is not shown
+BEYOND, BESIDE_PX = 0.01, 2
 AFLOAT = 0.25  # share of what floats beside a figure: so much of it has to in a drawing, too
 DRAWN, MIRRORED, GUESSED = 0, 1, 2  # where a pixel's paint comes from
 SOURCES = ("drawn", "mirrored", "guessed")
@@ -286,7 +287,7 @@ def _posed(
         return view, np.zeros(there.shape, dtype=bool)
     points = camera.unproject(camera.pixel_grid(), np.where(there, view.depth, 0))
     places, _, _ = places_in(texture.camera, points)
-    most = BEYOND * texture.figure_px
+    most = BEYOND * texture.figure_px + BESIDE_PX
     off = there & (sample_picture(texture.beyond, places, cv2.INTER_LINEAR) > most)
     if off.any():
         off = dilate(off, 2) & (off | ~there)
@@ -322,7 +323,8 @@ def _looks(
     looks = []
     for number, part, weight in sides:
         texture = drawings.textures[number]
-        seen = look_up(texture, points, STEP * drawings.height, CRUMB * figure_px**2)
+        slack, least_px = STEP * drawings.height, CRUMB * figure_px**2
+        seen = look_up(texture, points, slack, least_px, faces=drawings.shape is None)
         x, y = seen.moved(flow, part)
         scale = camera.scale / texture.camera.scale
         looks.append(Look(texture, x, y, seen.mask, weight, scale))

@@ -148,8 +148,9 @@ def whole_groups(looks: Sequence[Look]) -> list[Whole]:
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
-    own, its = (look.group for look in looks[:2])
-    pairs = np.unique(np.stack([own, its], axis=-1)[(own > 0) & (its > 0)], axis=0)
+    both = (looks[0].group > 0) & (looks[1].group > 0)
+    own, its = (look.group[both] for look in looks[:2])
+    pairs = np.unique(np.stack([own, its], axis=-1), axis=0)
     if not len(pairs):
         return []
     size = int(own.max()) + int(its.max()) + 2
@@ -167,12 +168,16 @@ def whole_groups(looks: Sequence[Look]) -> list[Whole]:
 
 def _shown(look: Look, groups: Sequence[int]) -> float:
     """Return the share of groups of features that a view shows, less where they are stretched."""
-    there = np.isin(look.group, groups)
-    drawn = np.count_nonzero(np.isin(look.texture.features.groups, groups))
-    across, down = np.gradient(look.x, axis=1)[there], np.gradient(look.y, axis=0)[there]
-    seen = float((across * down).clip(0, look.scale**-2 / GRAZED).sum())  # pixels of the drawing
-    shown = np.count_nonzero(there) / look.scale**2
-    return min(1.0, seen / max(drawn, 1)) * min(1.0, seen / max(shown, 1e-6))
+    drawn = look.texture.features.group_px[list(groups)].sum()
+    size = len(look.texture.features.group_px)
+    at = look.group > 0
+    # pixels of the drawing in a pixel of the view
+    density = np.gradient(look.x, axis=1)[at] * np.gradient(look.y, axis=0)[at]
+    within = look.group[at]
+    most = look.scale**-2 / GRAZED
+    seen = np.bincount(within, density.clip(0, most), size)[list(groups)].sum()
+    shown = np.bincount(within, minlength=size)[list(groups)].sum() / look.scale**2
+    return float(min(1.0, seen / max(drawn, 1)) * min(1.0, seen / max(shown, 1e-6)))
 
 
 def choose(

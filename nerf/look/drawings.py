@@ -22,6 +22,7 @@ from toonset.palette.palette import Shadow
 from toonset.raster import depth_inside, distance_to, nearest, sized_parts
 
 STEP = 0.03  # of the figure's height: surfaces so far apart in depth are two
+FACES = 2  # times as far behind: hair bulges over faces, which stay whole
 BESIDE_PX = 2  # behind a step of a known shape: hands miss steps by as much
 FARTHEST_PX = 50.0  # from an edge: farther is as far
 COARSE = 0.6  # times a drawing's size: smaller views take drawings of half the size
@@ -400,7 +401,12 @@ def _premultiplied(
 
 
 def look_up(
-    texture: Texture, points: Float[np.ndarray, "h w 3"], slack: float, least_px: float
+    texture: Texture,
+    points: Float[np.ndarray, "h w 3"],
+    slack: float,
+    least_px: float,
+    *,
+    faces: bool = False,
 ) -> Seen:
     """Return where places of the surface lie in a drawing, and which of them it shows.
 
@@ -409,11 +415,15 @@ def look_up(
         points: world.
         slack: world units that a place may lie behind the drawing's own surface.
         least_px: smaller patches and pinholes of what it shows are noise.
+        faces: groups of features may lie FACES times as far behind it.
     """
     (x, y), depth, front = places_in(texture.camera, points)
     border = cv2.BORDER_CONSTANT
     far = cv2.remap(texture.far, x, y, cv2.INTER_NEAREST, borderMode=border, borderValue=-np.inf)
     covered = cv2.remap(texture.whole[..., 3], x, y, cv2.INTER_LINEAR, borderMode=border)
+    if faces:
+        grouped = cv2.remap(texture.features.groups, x, y, cv2.INTER_NEAREST) > 0
+        far = far + np.float32((FACES - 1) * slack) * grouped
     mask = front & (covered > 0.5) & (depth <= far + slack)
     return Seen(x, y, without_crumbs(mask, least_px))
 

@@ -28,13 +28,8 @@ ROUND = 1.2  # times the pen's width: the line round a blot is its
 THICK = 2.0  # times the pen's width, from its edge: black so deep is paint
 INK_LIKE = 90  # of 255: such a colour is a line, which is no paint to go on with
 SAME_PAINT, ON_ONE = 0.15, 0.6  # of a channel; share of what is under a feature that is one paint
-import os
-
-NEAR, WIDE, BESIDE = (
-    float(os.environ.get("NEAR", ".03")),
-    float(os.environ.get("WIDE", ".5")),
-    float(os.environ.get("BESIDE", ".015")),
-)
+# Of the height, and of a feature's width: gaps in a group; room round it
+GAP, ROOM = (0.03, 1.0), 0.015
 MATTE = (0.03, 0.06)  # of 1: what differs less from the paint without it shows none; all, by more
 
 Mask = Bool[np.ndarray, "height width"]
@@ -81,6 +76,11 @@ class Features:
     found: tuple[Feature, ...]
     blots: Mask
     groups: Int16[np.ndarray, "height width"]
+
+    @cached_property
+    def group_px(self) -> Int[np.ndarray, " groups"]:
+        """Return the pixels of every group; the first number counts those of none."""
+        return np.bincount(self.groups.ravel())
 
     @cached_property
     def group_of(self) -> list[int]:
@@ -180,38 +180,31 @@ def _numbered(
 def _grouped(
     found: Sequence[Feature], inside: Mask, figure_px: float
 ) -> Int16[np.ndarray, "height width"]:
-    """Return the number of the group whose hull, with what is beside it, a pixel lies in.
+    """Return the group of features that every pixel belongs to: the eyes and mouth of a face.
 
-    Features near each other are one group: a face is.
+    It is the convex hull of features near each other, with room round it.
     """
-    groups = np.zeros(inside.shape, np.int16)
-    marked = np.zeros(inside.shape, np.uint8)
+    groups, near = np.zeros(inside.shape, np.int16), np.zeros(inside.shape, np.uint8)
+    corners = []
     for one in found:
-        near = round(figure_px * NEAR / 2 + WIDE * np.sqrt(one.area))
-        patch = np.pad((one.matte > 0.5).astype(np.uint8), near)
-        patch = cv2.dilate(patch, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * near + 1,) * 2))
-        top, left = one.rows.start - near, one.columns.start - near
-        rows = slice(max(0, top), min(len(marked), top + len(patch)))
-        columns = slice(max(0, left), min(marked.shape[1], left + patch.shape[1]))
-        part = patch[rows.start - top : rows.stop - top, columns.start - left : columns.stop - left]
-        marked[rows, columns] |= part
-    count, numbers = cv2.connectedComponents(marked, connectivity=8)
-    at = np.array([one.middle for one in found]).round().astype(int).reshape(-1, 2)
-    member = numbers[at[:, 1].clip(0, len(marked) - 1), at[:, 0].clip(0, marked.shape[1] - 1)]
-    for number in range(1, count):
-        own = [one for one, its in zip(found, member, strict=True) if its == number]
-        corners = [
-            (x, y)
-            for one in own
-            for x in (one.columns.start, one.columns.stop - 1)
-            for y in (one.rows.start, one.rows.stop - 1)
+        reach = (GAP[0] * figure_px + GAP[1] * np.sqrt(one.area)) / 2
+        rows, columns = one.rows, one.columns
+        box = [
+            (x, y) for x in (columns.start, columns.stop - 1) for y in (rows.start, rows.stop - 1)
         ]
-        if corners:
-            hull = np.zeros(inside.shape, np.uint8)
-            cv2.fillConvexPoly(hull, cv2.convexHull(np.array(corners, np.int32)), 1)
-            side = 2 * round(BESIDE * figure_px) + 1
-            hull = cv2.dilate(hull, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)))
-            groups[(hull > 0) & inside] = number
+        corners.append(np.array(box, np.int32))
+        x, y = np.array(box).mean(axis=0)
+        size = (columns.stop - columns.start + 2 * reach, rows.stop - rows.start + 2 * reach)
+        cv2.ellipse(near, ((x, y), size, 0.0), 1, -1)
+    _, parts = cv2.connectedComponents(near, connectivity=8)
+    member = [int(parts[tuple(np.rint(one.middle[::-1]).astype(int))]) for one in found]
+    side = 2 * round(ROOM * figure_px) + 1
+    round_it = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
+    for number in sorted(set(member)):
+        own = [box for box, its in zip(corners, member, strict=True) if its == number]
+        hull = np.zeros(inside.shape, np.uint8)
+        cv2.fillConvexPoly(hull, cv2.convexHull(np.concatenate(own)), 1)
+        groups[(cv2.dilate(hull, round_it) > 0) & inside] = number
     return groups
 
 

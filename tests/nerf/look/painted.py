@@ -6,10 +6,12 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
+import torch
 
 from tests.nerf.ellipsoids import first_hit
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
+from toonset.nerf.hull.hull import Hull
 from toonset.nerf.look.blend import Geometry
 from toonset.nerf.look.build import drawings_of
 from toonset.nerf.look.drawings import Drawings
@@ -19,6 +21,7 @@ AXES = np.array([0.6, 0.9, 0.5])
 SKIN, EYE, BELT, PATCH = (240, 200, 160), (40, 60, 160), (200, 40, 40), (60, 160, 60)
 PALETTE = np.array([SKIN, EYE, BELT, PATCH], dtype=np.uint8)
 INK = (10, 10, 10)
+ARM = (120, 30, 160)
 
 
 def camera_at(yaw: float, elevation: float = 0.0, side: int = SIDE) -> Camera:
@@ -99,3 +102,17 @@ def geometry(camera: Camera) -> Geometry:
 
 def unseen(view: Geometry) -> Geometry:
     return replace(view, alpha=np.zeros_like(view.alpha), depth=np.full_like(view.depth, np.nan))
+
+
+def with_an_arm() -> Drawings:
+    """Return drawings, the first of which alone shows an arm that the field lacks."""
+    scene = scene_of(ring())
+    rgba = scene.frames[0].rgba.copy()
+    rgba[54:64, 80:116] = (*ARM, 255)
+    scene = replace(scene, frames=(replace(scene.frames[0], rgba=rgba), *scene.frames[1:]))
+    at = np.stack(np.meshgrid(*[np.arange(40) * 0.05 - 0.975] * 3, indexing="ij"), axis=-1)
+    inside = ((at / AXES) ** 2).sum(axis=-1) < 1
+    hull = Hull(np.full(3, -1.0), 0.05, torch.as_tensor(inside.astype(np.float32)))
+    found = drawings_of(scene, scene, depth_of, hull=hull, bent=False)
+    assert found is not None
+    return found

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tests.nerf.look.painted import (
+    ARM,
     INK,
     LINE_PX,
     PALETTE,
@@ -18,6 +19,7 @@ from tests.nerf.look.painted import (
     geometry,
     ring,
     unseen,
+    with_an_arm,
 )
 from toonset.nerf.look.blend import DRAWN, GUESSED, MIRRORED, blend_view, flanking
 from toonset.nerf.look.drawings import Drawings, Original
@@ -215,3 +217,29 @@ def test_what_only_mirror_images_show_is_told() -> None:
     assert seen.share(MIRRORED) > 0.3
     assert seen.share(DRAWN) + seen.share(MIRRORED) + seen.share(GUESSED) == pytest.approx(1)
     assert blend_view(found, geometry(camera_at(-1.5))).share(MIRRORED) == 0
+
+
+def test_an_arm_that_one_drawing_has_is_whole_near_it_and_gone_near_the_others() -> None:
+    found = with_an_arm()
+    assert [view.limbs is not None for view in found.views] == [True] + 7 * [False]
+
+    def arm_px(yaw: float) -> int:
+        view = blend_view(found, geometry(camera_at(yaw)))
+        like = np.abs(view.paint - np.array(ARM) / 255).max(axis=-1) < 0.2
+        return int((like & (view.alpha > 0.5)).sum())
+
+    drawn = arm_px(0.0)
+    assert drawn > 100
+    for yaw in (0.2, 0.35, -0.35):
+        assert arm_px(yaw) > 0.6 * np.cos(yaw) * drawn
+    for yaw in (0.5, 1.6, 3.1):
+        assert arm_px(yaw) < 3
+
+
+def test_what_the_nearest_drawing_denies_is_not_shown() -> None:
+    found = drawings(ring(4))
+    front = geometry(camera_at(0.2))
+    alpha, depth = front.alpha.copy(), front.depth.copy()
+    alpha[54:64, 90:116], depth[54:64, 90:116] = 1, 0
+    view = blend_view(found, replace(front, alpha=alpha, depth=depth))
+    assert view.alpha[54:64, 100:].max() == 0

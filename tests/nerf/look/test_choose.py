@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from toonset.nerf.look.blend import _afloat
-from toonset.nerf.look.choose import Look, choose
+from toonset.nerf.look.choose import Look, choose, whole_groups
 
 SIZE = 120
 Y, X = (axis.astype(np.float32) for axis in np.mgrid[:SIZE, :SIZE])
@@ -48,3 +48,34 @@ def test_a_hand_that_floats_goes_unless_a_drawing_shows_it_so() -> None:
     assert off[hand].all()
     assert not off[solid & ~hand].any()
     assert not _afloat(solid, [look_at(paint, 0.5), look_at(paint, 0.5, hand)]).any()
+
+
+def face_at(share: float, middle: int, stretched: float = 1.0) -> Look:
+    """Return a view of a drawing with a face of 40 pixels round a column."""
+    groups = (np.hypot(X - middle, Y - 60) < 20).astype(np.int16)
+    paint = np.full((*INSIDE.shape, 3), 0.6, np.float32)
+    paint[groups > 0] = (0.6, share, middle / SIZE)
+    look = look_at(paint, share)
+    features = SimpleNamespace(groups=groups, group_px=np.bincount(groups.ravel()))
+    texture = SimpleNamespace(**vars(look.texture), features=features)
+    x = (X - 60) / np.float32(stretched) + 60
+    return Look(texture, x, Y, INSIDE, share, 1.0)  # type: ignore[arg-type]
+
+
+def test_a_face_that_two_drawings_put_in_two_places_is_one_drawings() -> None:
+    looks = [face_at(0.52, 54), face_at(0.48, 66)]
+    (whole,) = whole_groups(looks)
+    assert (whole.leader, whole.groups) == (0, ((1,), (1,)))
+    both = (looks[0].group > 0) | (looks[1].group > 0)
+    assert (whole.region(looks) == both).all()
+    chosen, _ = choose(looks, INSIDE, float(SIZE), [whole])
+    assert (chosen[both] == 0).all()
+
+
+def test_the_face_that_is_stretched_less_leads() -> None:
+    (whole,) = whole_groups([face_at(0.55, 60, stretched=2.0), face_at(0.45, 60)])
+    assert whole.leader == 1
+
+
+def test_faces_apart_are_nobodys_business() -> None:
+    assert whole_groups([face_at(0.5, 30), face_at(0.5, 90)]) == []

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from toonset.camera import Camera
-from toonset.nerf.look.choose import Look
+from toonset.nerf.look.choose import Look, Whole
 from toonset.nerf.look.features import Features, features_of
 from toonset.nerf.look.stamps import stamped, stamps, torn
 
@@ -170,3 +170,30 @@ def test_a_face_without_features_is_left_as_it_is() -> None:
     found = features_of(face(), np.zeros(FACE.shape, np.uint8), FACE, (2.0, (0, 0, 0)), HEIGHT)
     assert found.found == ()
     assert np.array_equal(found.paint, face())
+
+
+def test_the_features_of_a_face_are_one_group_and_a_button_is_another() -> None:
+    picture = face((80, 50), (110, 50), (95, 160))
+    found = features_of(picture, np.zeros(FACE.shape, np.uint8), FACE, None, HEIGHT)
+    groups = found.groups
+    assert (
+        groups[50, 80] == groups[50, 110] == groups[50, 95] > 0
+    )  # what lies between belongs to it
+    assert groups[160, 95] not in {0, groups[50, 80]}
+    assert groups[105, 95] == 0
+    assert len(set(found.group_of)) == 2
+    assert found.group_px.sum() == groups.size
+
+
+def test_a_face_that_one_drawing_shows_keeps_its_own_places_and_loses_the_others() -> None:
+    own, its = face((70, 60), (110, 60)), face((80, 60), (120, 60))
+    looks = [look_at(own, 0.6), look_at(its, 0.4)]
+    whole = Whole(0, ((1,), (1,)))
+    chosen = np.zeros(FACE.shape, int)
+    counts = np.stack([np.full(FACE.shape, look.share, np.float32) for look in looks])
+    depth = np.zeros(FACE.shape, np.float32)
+    placed, without = stamps(looks, True, CAMERA, chosen, counts, depth, HEIGHT, [whole])
+    middles = sorted(stamp.middle[0] for stamp in placed)
+    assert middles == pytest.approx([70, 110], abs=0.6)
+    assert {stamp.drawing for stamp in placed} == {0}
+    assert without[1][1:].all()

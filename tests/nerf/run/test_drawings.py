@@ -17,7 +17,7 @@ from safetensors.torch import load_file
 from tests.nerf.bodies import Hand
 from tests.nerf.bodies import camera_at as body_camera
 from tests.nerf.ellipsoids import train_scene
-from tests.nerf.look.painted import camera_at, geometry
+from tests.nerf.look.painted import camera_at, geometry, with_an_arm
 from tests.nerf.look.test_shaped import drawn, misty
 from tests.nerf.run.damage import Harm, config, tensors, written
 from toonset.dataset.images.picture import encode_png, load_rgba
@@ -64,6 +64,21 @@ def test_views_are_the_same_after_loading(folder: Path, egg: Drawings) -> None:
     pixels = 8 * 120 * 120
     for name, most in ((PICTURES, 0.5), (PAINT, 0.5), (SURFACES, 1.6)):
         assert (folder / name).stat().st_size < most * pixels
+
+
+def test_limbs_of_single_drawings_are_the_same_after_loading(
+    tmp_path: Path, training: Training
+) -> None:
+    found = with_an_arm()
+    result = replace(training.result, drawings=found)
+    folder = written(tmp_path / "arm", replace(training, result=result))
+    loaded = read_field(folder).drawings
+    assert loaded is not None
+    a, b = (blend_view(one, geometry(camera_at(0.4))) for one in (found, loaded))
+    np.testing.assert_array_equal(a.rgb, b.rgb)
+    tensors(SURFACES, lambda held: held.pop("limbs.0.faces"))(folder)
+    with pytest.raises(BundleError, match=r"limbs\.0\.faces; train again"):
+        read_field(folder)
 
 
 def test_a_mannequins_shape_lines_and_shadow_are_the_same_after_loading(
