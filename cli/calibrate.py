@@ -270,6 +270,11 @@ def _say_inputs(sheet: Sheet, mesh: Mesh | Literal["none"] | None, printer: Prin
     remarks = mesh.remarks if mesh is not None and not isinstance(mesh, str) else ()
     for note in (*sheet.skipped, *sheet.warnings, *remarks):
         printer.say(note)
+    if sheet.outfits and "outfit" not in sheet.options:
+        printer.say(
+            f"rows A to {sheet.outfits[-1]} show the same directions and are taken for one body; if "
+            "clothes differ, take one row with --outfit A, or each with --outfit all"
+        )
     looks = MannequinOptions()
     body = "no mannequin"
     if mesh is None:

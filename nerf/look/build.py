@@ -20,7 +20,7 @@ from toonset.nerf.look.drawings import STEP, Drawing, Drawings, Original, levels
 from toonset.nerf.look.flat_paint import flat_paint
 from toonset.nerf.look.outline import outline_of
 from toonset.nerf.look.paint_flow import Depths, pair_flows
-from toonset.nerf.sections.own_limbs import own_limbs
+from toonset.nerf.sections.own_limbs import OwnLimbs, own_limbs
 from toonset.nerf.sections.roles import at_eye_level
 
 COARSE, MOST_COLORS = 32, 12  # levels of a channel that count as one; colours
@@ -63,12 +63,14 @@ def drawings_of(
         depths = side_by_side([partial(depth_of, frame.camera) for frame in frames])
     limbs: list[Shape | None] = [None] * len(frames)
     if shape is None and hull is not None:
-        for number, (own, denied) in enumerate(_own_limbs(frames, hull, depth_of)):
-            limbs[number] = own
-            if denied is not None:
-                depths[number] = np.where(denied, np.nan, depths[number])
-            if own is not None:
-                depths[number] = np.fmin(depths[number], own.seen(frames[number].camera).depth)
+        for number, own in enumerate(_own_limbs(frames, hull, depth_of)):
+            if own is None:
+                continue
+            depths[number] = np.where(own.denied, np.nan, depths[number])
+            if own.mesh is not None:
+                camera = frames[number].camera
+                limbs[number] = body = shape_of(own.mesh, [camera])
+                depths[number] = np.fmin(depths[number], body.seen(camera).depth)
     seen = np.concatenate([depth[np.isfinite(depth)] for depth in depths])
     if not len(seen):
         return None
@@ -96,22 +98,15 @@ def drawings_of(
     return found.with_flows(pair_flows(found, depth_of))
 
 
-def _own_limbs(
-    frames: Sequence[Frame], hull: Hull, depth_of: Depths
-) -> list[tuple[Shape | None, Bool[np.ndarray, "height width"] | None]]:
-    """Return per drawing what it shows and the field lacks, and where the field shows too much."""
-    cameras = [frame.camera for frame in frames]
-    if len(frames) < 2 or not at_eye_level(cameras):
-        return [(None, None)] * len(frames)
+def _own_limbs(frames: Sequence[Frame], hull: Hull, depth_of: Depths) -> list[OwnLimbs | None]:
+    """Return per drawing what it shows otherwise than the field."""
+    if len(frames) < 2 or not at_eye_level([frame.camera for frame in frames]):
+        return [None] * len(frames)
 
     def shows(camera: Camera) -> Bool[np.ndarray, "height width"]:
         return np.isfinite(depth_of(camera))
 
-    found = own_limbs(frames, hull.support.numpy(), hull.low, hull.voxel, shows)
-    return [
-        (limbs and limbs.mesh and shape_of(limbs.mesh, [camera]), limbs and limbs.denied)
-        for limbs, camera in zip(found, cameras, strict=True)
-    ]
+    return own_limbs(frames, hull.support.numpy(), hull.low, hull.voxel, shows)
 
 
 def _denied_places(

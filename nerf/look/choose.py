@@ -222,11 +222,11 @@ def _choose(
         ]
     )
     counts += 1e-6 * np.stack([look.seen for look in looks])
-    for one in whole:
-        shown = one.region(looks) & looks[one.leader].seen
-        others = np.arange(len(looks)) != one.leader
+    for group in whole:
+        shown = group.region(looks) & looks[group.leader].seen
+        others = np.arange(len(looks)) != group.leader
         counts[:, shown] *= np.where(others, OUTDONE, 1)[:, None]
-        counts[one.leader][shown] = np.maximum(counts[one.leader][shown], MOSTLY)
+        counts[group.leader][shown] = np.maximum(counts[group.leader][shown], MOSTLY)
     best = np.where(counts.max(axis=0) > 0, counts.argmax(axis=0), -1)
     best = _without_islands(best, within, ISLAND * figure_px**2)
     if len(looks) == 1:

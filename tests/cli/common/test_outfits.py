@@ -67,6 +67,12 @@ def test_each_outfit_is_calibrated_as_it_is_alone(sheet: Path, toonset, snapshot
     assert toonset("info", "bundle/A").code == 0
 
 
+@pytest.mark.parametrize(("outfit", "told"), [((), True), (("--outfit", "A"), False)])
+def test_calibrating_all_rows_as_one_body_is_told(sheet: Path, toonset, outfit, told: bool):
+    done = toonset("calibrate", sheet, "--mesh", "none", *outfit)
+    assert ("rows A to B show the same directions and are taken for one body" in done.err) == told
+
+
 def test_a_doubt_names_its_outfit(sheet: Path, toonset):
     picture = Image.open(sheet)
     picture.crop((60, 0, picture.width - 41, picture.height)).save("cut.png")
