@@ -30,7 +30,6 @@ SPREAD = 0.04  # sigma over which drawings are compared
 OTHER = 0.1  # share of a drawing that does not flank the view
 LEVEL = 2.0  # times as much as another: up to here the seam is free
 EVEN = 100.0  # squares of levels, as differences of colour: a pixel of seam, e times the count
-GRAZED = 0.1  # of the view's pixels per one of a drawing: what is seen more from aside is hidden
 OUTDONE, MOSTLY = 1e-6, 1e-3  # counts of others, and least one, where one drawing shows all
 ISLAND = 2e-3  # of the squared height: smaller patches of one drawing tear what they lie in
 ENOUGH_PX = 260  # height at which drawings are chosen well enough
@@ -143,41 +142,32 @@ class Whole:
 def whole_groups(looks: Sequence[Look]) -> list[Whole]:
     """Return the groups of features that both flanking drawings have, and who shows them.
 
-    It is the drawing that shows more of them, and less stretched, by its share of the view.
+    It is the drawing that shows what both have less stretched, by its share of the view.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
     both = (looks[0].group > 0) & (looks[1].group > 0)
-    own, its = (look.group[both] for look in looks[:2])
-    pairs = np.unique(np.stack([own, its], axis=-1), axis=0)
-    if not len(pairs):
+    if not both.any():
         return []
+    own, its = (look.group[both] for look in looks[:2])
+    worth = [look.share * _fineness(look)[both] for look in looks[:2]]
     size = int(own.max()) + int(its.max()) + 2
-    first, second = pairs[:, 0], pairs[:, 1] + int(own.max()) + 1
-    joined = coo_matrix((np.ones(len(pairs)), (first, second)), shape=(size, size))
+    second = its + int(own.max()) + 1
+    joined = coo_matrix((np.ones(len(own)), (own, second)), shape=(size, size))
     _, part = connected_components(joined, directed=False)
     found = []
-    for number in np.unique(part[first]):
-        of = pairs[part[first] == number]
-        groups = tuple(np.unique(of[:, 0]).tolist()), tuple(np.unique(of[:, 1]).tolist())
-        shown = [look.share * _shown(look, ids) for look, ids in zip(looks, groups, strict=False)]
-        found.append(Whole(int(shown[1] > shown[0]), groups))
+    for number in np.unique(part[own]):
+        at = part[own] == number
+        groups = tuple(np.unique(own[at]).tolist()), tuple(np.unique(its[at]).tolist())
+        found.append(Whole(int(worth[1][at].sum() > worth[0][at].sum()), groups))
     return found
 
 
-def _shown(look: Look, groups: Sequence[int]) -> float:
-    """Return the share of groups of features that a view shows, less where they are stretched."""
-    drawn = look.texture.features.group_px[list(groups)].sum()
-    size = len(look.texture.features.group_px)
-    at = look.group > 0
-    # pixels of the drawing in a pixel of the view
-    density = np.gradient(look.x, axis=1)[at] * np.gradient(look.y, axis=0)[at]
-    within = look.group[at]
-    most = look.scale**-2 / GRAZED
-    seen = np.bincount(within, density.clip(0, most), size)[list(groups)].sum()
-    shown = np.bincount(within, minlength=size)[list(groups)].sum() / look.scale**2
-    return float(min(1.0, seen / max(drawn, 1)) * min(1.0, seen / max(shown, 1e-6)))
+def _fineness(look: Look) -> Float[np.ndarray, "h w"]:
+    """Return pixels of a drawing per pixel of the view, as fine as both are: 1 at most."""
+    density = np.gradient(look.x, axis=1) * np.gradient(look.y, axis=0) * look.scale**2
+    return density.clip(0, 1)
 
 
 def choose(

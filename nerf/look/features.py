@@ -28,8 +28,8 @@ ROUND = 1.2  # times the pen's width: the line round a blot is its
 THICK = 2.0  # times the pen's width, from its edge: black so deep is paint
 INK_LIKE = 90  # of 255: such a colour is a line, which is no paint to go on with
 SAME_PAINT, ON_ONE = 0.15, 0.6  # of a channel; share of what is under a feature that is one paint
-# Of the height, and of a feature's width: gaps in a group; room round it
-GAP, ROOM = (0.03, 1.0), 0.015
+# Of the height, and of a feature's width: gaps in a group; its largest side; room round it
+GAP, WIDEST, ROOM = (0.03, 1.0), 0.35, 0.015
 MATTE = (0.03, 0.06)  # of 1: what differs less from the paint without it shows none; all, by more
 
 Mask = Bool[np.ndarray, "height width"]
@@ -76,11 +76,6 @@ class Features:
     found: tuple[Feature, ...]
     blots: Mask
     groups: Int16[np.ndarray, "height width"]
-
-    @cached_property
-    def group_px(self) -> Int[np.ndarray, " groups"]:
-        """Return the pixels of every group; the first number counts those of none."""
-        return np.bincount(self.groups.ravel())
 
     @cached_property
     def group_of(self) -> list[int]:
@@ -182,29 +177,32 @@ def _grouped(
 ) -> Int16[np.ndarray, "height width"]:
     """Return the group of features that every pixel belongs to: the eyes and mouth of a face.
 
-    It is the convex hull of features near each other, with room round it.
+    It is the convex hull of features near each other, with room round it. The nearest are joined
+    first, and no group becomes larger than a face.
     """
-    groups, near = np.zeros(inside.shape, np.int16), np.zeros(inside.shape, np.uint8)
-    corners = []
-    for one in found:
-        reach = (GAP[0] * figure_px + GAP[1] * np.sqrt(one.area)) / 2
-        rows, columns = one.rows, one.columns
-        box = [
-            (x, y) for x in (columns.start, columns.stop - 1) for y in (rows.start, rows.stop - 1)
-        ]
-        corners.append(np.array(box, np.int32))
-        x, y = np.array(box).mean(axis=0)
-        size = (columns.stop - columns.start + 2 * reach, rows.stop - rows.start + 2 * reach)
-        cv2.ellipse(near, ((x, y), size, 0.0), 1, -1)
-    _, parts = cv2.connectedComponents(near, connectivity=8)
-    member = [int(parts[tuple(np.rint(one.middle[::-1]).astype(int))]) for one in found]
+    groups = np.zeros(inside.shape, np.int16)
+    if not found:
+        return groups
+    low = np.array([(one.columns.start, one.rows.start) for one in found])
+    high = np.array([(one.columns.stop, one.rows.stop) for one in found]) - 1
+    wide = np.sqrt([one.area for one in found])
+    gaps = np.maximum(low[:, None] - high[None], low[None] - high[:, None]).clip(0)
+    apart = np.hypot(gaps[..., 0], gaps[..., 1])
+    near = apart < GAP[0] * figure_px + GAP[1] * (wide[:, None] + wide[None]) / 2
+    member = np.arange(len(found))
+    pairs = np.argwhere(np.triu(near, 1))
+    for i, j in pairs[np.argsort(apart[tuple(pairs.T)], kind="stable")]:
+        joined = (member == member[i]) | (member == member[j])
+        if (high[joined].max(axis=0) - low[joined].min(axis=0)).max() < WIDEST * figure_px:
+            member[joined] = member[i]
     side = 2 * round(ROOM * figure_px) + 1
-    round_it = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
-    for number in sorted(set(member)):
-        own = [box for box, its in zip(corners, member, strict=True) if its == number]
+    room = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
+    for number, one in enumerate(np.unique(member), start=1):
+        (x0, y0), (x1, y1) = (np.moveaxis(at[member == one], -1, 0) for at in (low, high))
+        corners = np.stack([[x0, x0, x1, x1], [y0, y1, y0, y1]], axis=-1).reshape(-1, 2)
         hull = np.zeros(inside.shape, np.uint8)
-        cv2.fillConvexPoly(hull, cv2.convexHull(np.concatenate(own)), 1)
-        groups[(cv2.dilate(hull, round_it) > 0) & inside] = number
+        cv2.fillConvexPoly(hull, cv2.convexHull(corners.astype(np.int32)), 1)
+        groups[(cv2.dilate(hull, room) > 0) & inside] = number
     return groups
 
 

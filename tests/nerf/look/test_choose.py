@@ -56,7 +56,7 @@ def face_at(share: float, middle: int, stretched: float = 1.0) -> Look:
     paint = np.full((*INSIDE.shape, 3), 0.6, np.float32)
     paint[groups > 0] = (0.6, share, middle / SIZE)
     look = look_at(paint, share)
-    features = SimpleNamespace(groups=groups, group_px=np.bincount(groups.ravel()))
+    features = SimpleNamespace(groups=groups)
     texture = SimpleNamespace(**vars(look.texture), features=features)
     x = (X - 60) / np.float32(stretched) + 60
     return Look(texture, x, Y, INSIDE, share, 1.0)  # type: ignore[arg-type]
