@@ -30,6 +30,7 @@ from toonset.nerf.look.drawings import (
     places_in,
     sample_picture,
 )
+from toonset.nerf.look.features import lines_of
 from toonset.nerf.look.outline import crisp_outline, inked_outline, without_noise
 from toonset.nerf.look.paint_flow import NEIGHBOURS
 from toonset.nerf.look.shade import smoothed
@@ -263,7 +264,7 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
     kept = shown & ~torn(color, looks, np.where(shown, chosen, -1), shown, figure_px)
     if not shown.any():  # as if the body were of glass
         color, labels = mixed(looks, np.zeros_like(chosen), counts)
-    color, labels = filled_from(kept, color, labels)
+    color, labels = _gone_on(drawings, kept, color, labels, scale)
     color, labels = stamped(color, labels, looks, features, depth, NEARER * drawings.height)
     mirrored = np.array([drawings.views[number].mirrored for number in numbers])
     source = np.where(shown, np.where(mirrored[chosen], MIRRORED, DRAWN), GUESSED)
@@ -275,6 +276,22 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
     if part == 1:
         source = np.full(source.shape, MIRRORED if drawings.views[own].mirrored else DRAWN)
     return DrawnView(rgb, alpha, ink, labels, color, source.astype(np.uint8))
+
+
+def _gone_on(
+    drawings: Drawings,
+    kept: Bool[np.ndarray, "h w"],
+    color: Float[np.ndarray, "h w 3"],
+    labels: UInt8[np.ndarray, "h w"],
+    scale: float,
+) -> tuple[Float[np.ndarray, "h w 3"], UInt8[np.ndarray, "h w"]]:
+    """Return paint that goes on beyond what is kept; lines do not."""
+    line = drawings.outline
+    paint = kept & ~lines_of(color, line and (line.width_px * scale, line.rgb))
+    if not paint.any():
+        paint = kept
+    beyond, beyond_labels = filled_from(paint, color, labels)
+    return np.where(kept[..., None], color, beyond), np.where(kept, labels, beyond_labels)
 
 
 def _posed(

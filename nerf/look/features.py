@@ -120,12 +120,7 @@ def features_of(
         part = np.where(near, blots[nearest(blots > 0)], 0)
     whole = cv2.resize(part.astype(np.int16), inside.shape[::-1], interpolation=cv2.INTER_NEAREST)
     whole *= inside
-    lined = np.zeros(inside.shape, dtype=bool)
-    if pen:
-        apart = np.abs(drawn * 255 - np.array(pen[1], np.float32)).max(axis=2)
-        inky = apart < INK_LIKE
-        thick = depth_inside(inky) > THICK * width  # is paint
-        lined = dilate(inky & (distance_to(thick) > (THICK + 1) * width if thick.any() else True))
+    lined = lines_of(drawn, pen)
     bare = inside & (whole == 0)
     kept = bare & ~lined if (bare & ~lined).any() else bare
     if not kept.any() or not whole.any():
@@ -145,6 +140,22 @@ def features_of(
         beside,
         _grouped(found, inside, figure_px),
     )
+
+
+def lines_of(picture: Picture, pen: tuple[float, tuple[int, int, int]] | None) -> Mask:
+    """Return the pixels of a picture in which a pen's lines are, and beside them.
+
+    Args:
+        picture: in [0, 1].
+        pen: width in pixels and colour; None: there are no lines.
+    """
+    lined = np.zeros(picture.shape[:2], dtype=bool)
+    if pen:
+        width, rgb = pen
+        inky = np.abs(picture * 255 - np.array(rgb, np.float32)).max(axis=2) < INK_LIKE
+        thick = depth_inside(inky) > THICK * width  # is paint
+        lined = dilate(inky & (distance_to(thick) > (THICK + 1) * width if thick.any() else True))
+    return lined
 
 
 def _numbered(
