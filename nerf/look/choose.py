@@ -30,6 +30,7 @@ SPREAD = 0.04  # sigma over which drawings are compared
 OTHER = 0.1  # share of a drawing that does not flank the view
 LEVEL = 2.0  # times as much as another: up to here the seam is free
 EVEN = 100.0  # squares of levels, as differences of colour: a pixel of seam, e times the count
+TOUCHING = 0.2  # of the smaller of two groups: what overlaps less is not one thing
 OUTDONE, MOSTLY = 1e-6, 1e-3  # counts of others, and least one, where one drawing shows all
 ISLAND = 2e-3  # of the squared height: smaller patches of one drawing tear what they lie in
 ENOUGH_PX = 260  # height at which drawings are chosen well enough
@@ -154,11 +155,15 @@ def whole_groups(looks: Sequence[Look]) -> list[Whole]:
     worth = [look.share * _fineness(look)[both] for look in looks[:2]]
     size = int(own.max()) + int(its.max()) + 2
     second = its + int(own.max()) + 1
-    joined = coo_matrix((np.ones(len(own)), (own, second)), shape=(size, size))
+    pairs = coo_matrix((np.ones(len(own)), (own, second)), shape=(size, size)).tocsr().tocoo()
+    shown = [np.bincount(look.group.ravel(), minlength=size) for look in looks[:2]]
+    least = np.minimum(shown[0][pairs.row], shown[1][pairs.col - int(own.max()) - 1])
+    kept = pairs.data > TOUCHING * least
+    joined = coo_matrix((pairs.data[kept], (pairs.row[kept], pairs.col[kept])), shape=(size, size))
     _, part = connected_components(joined, directed=False)
     found = []
-    for number in np.unique(part[own]):
-        at = part[own] == number
+    for number in np.unique(part[pairs.row[kept]]):
+        at = (part[own] == number) & (part[second] == number)
         groups = tuple(np.unique(own[at]).tolist()), tuple(np.unique(its[at]).tolist())
         found.append(Whole(int(worth[1][at].sum() > worth[0][at].sum()), groups))
     return found

@@ -47,6 +47,7 @@ class Feature:
         middle: (2,) column and row.
         area: pixels that it covers.
         rgb: (3,) mean colour in [0, 1], the artist's.
+        under: (3,) of the paint that it lies on.
     """
 
     rows: slice
@@ -55,6 +56,7 @@ class Feature:
     middle: Float[np.ndarray, " 2"]
     area: float
     rgb: Float[np.ndarray, " 3"]
+    under: Float[np.ndarray, " 3"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,14 +173,15 @@ def _numbered(
         own = matte[box] * (parts[box] == one)
         area = float(own.sum())
         under = ground[box][parts[box] == one]
-        like = np.abs(under - np.median(under, axis=0)).max(axis=-1) < SAME_PAINT
+        paint = np.median(under, axis=0)
+        like = np.abs(under - paint).max(axis=-1) < SAME_PAINT
         if area < 1 or like.mean() < ON_ONE:
             continue
         y, x = np.mgrid[box]
         middle = np.array([(own * x).sum(), (own * y).sum()]) / area
         rgb = (drawn[box] * own[..., None]).sum(axis=(0, 1)) / area
         across, down = box[1], box[0]
-        found.append(Feature(down, across, own.astype(np.float32), middle, area, rgb))
+        found.append(Feature(down, across, own.astype(np.float32), middle, area, rgb, paint))
         numbers[one] = len(found)
     return numbers[parts], tuple(found)
 
@@ -200,6 +203,8 @@ def _grouped(
     gaps = np.maximum(low[:, None] - high[None], low[None] - high[:, None]).clip(0)
     apart = np.hypot(gaps[..., 0], gaps[..., 1])
     near = apart < GAP[0] * figure_px + GAP[1] * (wide[:, None] + wide[None]) / 2
+    under = np.stack([one.under for one in found])
+    near &= np.abs(under[:, None] - under[None]).max(axis=-1) < SAME_PAINT
     member = np.arange(len(found))
     pairs = np.argwhere(np.triu(near, 1))
     for i, j in pairs[np.argsort(apart[tuple(pairs.T)], kind="stable")]:

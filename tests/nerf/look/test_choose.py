@@ -5,6 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from toonset.nerf.look.blend import _afloat
 from toonset.nerf.look.choose import Look, choose, whole_groups
@@ -77,5 +78,6 @@ def test_the_face_that_is_stretched_less_leads() -> None:
     assert whole.leader == 1
 
 
-def test_faces_apart_are_nobodys_business() -> None:
-    assert whole_groups([face_at(0.5, 30), face_at(0.5, 90)]) == []
+@pytest.mark.parametrize("middles", [(30, 90), (42, 78)])
+def test_faces_apart_or_just_touching_are_nobodys_business(middles: tuple[int, int]) -> None:
+    assert whole_groups([face_at(0.5, middle) for middle in middles]) == []

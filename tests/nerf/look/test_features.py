@@ -204,3 +204,11 @@ def test_no_group_is_larger_than_a_face() -> None:
     sizes = [np.ptp(np.argwhere(found.groups == n), axis=0).max() for n in set(found.group_of)]
     assert len(sizes) > 1
     assert max(sizes) < (0.35 + 2 * 0.015) * HEIGHT + 2
+
+
+def test_features_on_two_paints_are_two_groups() -> None:
+    picture = face((80, 50), (80, 80))
+    picture[65:] = (0.2, 0.4, 0.9)
+    cv2.circle(picture, (80, 80), 7, BLACK, -1)
+    found = features_of(picture, np.zeros(FACE.shape, np.uint8), FACE, None, HEIGHT)
+    assert len(set(found.group_of)) == len(found.found) == 2
