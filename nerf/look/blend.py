@@ -287,7 +287,8 @@ def _gone_on(
 ) -> tuple[Float[np.ndarray, "h w 3"], UInt8[np.ndarray, "h w"]]:
     """Return paint that goes on beyond what is kept; lines do not."""
     line = drawings.outline
-    paint = kept & ~lines_of(color, line and (line.width_px * scale, line.rgb))
+    pen = None if line is None else (line.width_px * scale, line.rgb)
+    paint = kept & ~lines_of(color, pen)
     if not paint.any():
         paint = kept
     beyond, beyond_labels = filled_from(paint, color, labels)
