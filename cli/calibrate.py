@@ -272,8 +272,8 @@ def _say_inputs(sheet: Sheet, mesh: Mesh | Literal["none"] | None, printer: Prin
         printer.say(note)
     if sheet.outfits and "outfit" not in sheet.options:
         printer.say(
-            f"rows A to {sheet.outfits[-1]} show the same directions and are taken for one body; if "
-            "clothes differ, take one row with --outfit A, or each with --outfit all"
+            f"rows A to {sheet.outfits[-1]} show the same directions and are taken for one body; "
+            "if clothes differ, take one row with --outfit A, or each with --outfit all"
         )
     looks = MannequinOptions()
     body = "no mannequin"
