@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -95,10 +96,18 @@ def grid_of(drawings: Sequence[Drawing], per_px: float) -> Grid:
         if not np.isfinite(low[axis]):
             middle = np.mean([drawing.camera.target[axis] for drawing in drawings])
             half = (high[other] - low[other]) / 2
+            if not np.isfinite(half):  # diagonals only: a square that stands on its corner
+                half = max(_widest(drawing) for drawing in drawings) / math.sqrt(2)
             low[axis], high[axis] = middle - half, middle + half
     low, high = low - MARGIN_PX * per_px, high + MARGIN_PX * per_px
     counts = np.ceil((high - low) / (VOXEL_PX * per_px)).astype(int).tolist()
     return Grid(low, per_px, (counts[0], counts[1], counts[2]))
+
+
+def _widest(drawing: Drawing) -> float:
+    """Return how wide a drawing's figure is, world units."""
+    drawn = np.flatnonzero(drawing.mask.any(axis=0))
+    return float(drawn[-1] + 1 - drawn[0]) / float(drawing.camera.scale_uv[0])
 
 
 def _spans(drawing: Drawing) -> list[tuple[int, tuple[float, float]]]:

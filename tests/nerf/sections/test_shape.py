@@ -72,6 +72,13 @@ def test_two_side_drawings_agree_with_one() -> None:
     assert volume(two) == pytest.approx(volume(one), rel=0.02)
 
 
+@pytest.mark.parametrize("yaws", [(45, 135), (45, -45), (45, 135, -135)])
+def test_diagonals_alone_have_a_shape(yaws: tuple[float, ...]) -> None:
+    """No drawing looks along an axis of the grid."""
+    solid = shape_of(sheet(yaws, [BODY]))
+    assert volume(solid) == pytest.approx(4 / 3 * math.pi * np.prod(BODY[1]), rel=0.25)
+
+
 def test_sheets_without_front_or_back() -> None:
     """Two diagonals and the side between them tell as much."""
     solid = shape_of(sheet((50, 90, 130), [BODY]))
