@@ -19,7 +19,7 @@ from jaxtyping import Bool, Float, UInt8
 
 from toonset.camera import Camera
 from toonset.nerf.hull.mannequin_shape import FINER, Shape, ShapeView
-from toonset.nerf.look.choose import OTHER, Look, choose, filled_from, mixed, whole_groups
+from toonset.nerf.look.choose import OTHER, Look, choose, filled_from, mixed, shared_groups
 from toonset.nerf.look.drawings import (
     CRUMB,
     STEP,
@@ -250,13 +250,13 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
     scale = looks[0].scale
     alpha, ink = _outlined(drawings, view, looks, border, sight, whole[..., 3], part)
     both = flank[0] != flank[1]
-    whole_ones = whole_groups(looks) if both and sight is None else []
-    chosen, counts = choose(looks, alpha > 0, figure_px, whole_ones)
+    shared = shared_groups(looks) if both and sight is None else []
+    chosen, counts = choose(looks, alpha > 0, figure_px, shared)
     features: list[Stamp] = []
     if sight is None:
         solid = np.where(alpha > SOLID, chosen, -1)
         features, without = stamps(
-            looks, both, camera, solid, counts, depth, drawings.height, whole_ones
+            looks, both, camera, solid, counts, depth, drawings.height, shared
         )
         looks = [look.bare(those) for look, those in zip(looks, without, strict=True)]
     color, labels = mixed(looks, chosen, counts)
@@ -264,7 +264,7 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
     kept = shown & ~torn(color, looks, np.where(shown, chosen, -1), shown, figure_px)
     if not shown.any():  # as if the body were of glass
         color, labels = mixed(looks, np.zeros_like(chosen), counts)
-    color, labels = _gone_on(drawings, kept, color, labels, scale)
+    color, labels = _extended(drawings, kept, color, labels, scale)
     color, labels = stamped(color, labels, looks, features, depth, NEARER * drawings.height)
     mirrored = np.array([drawings.views[number].mirrored for number in numbers])
     source = np.where(shown, np.where(mirrored[chosen], MIRRORED, DRAWN), GUESSED)
@@ -278,7 +278,7 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
     return DrawnView(rgb, alpha, ink, labels, color, source.astype(np.uint8))
 
 
-def _gone_on(
+def _extended(
     drawings: Drawings,
     kept: Bool[np.ndarray, "h w"],
     color: Float[np.ndarray, "h w 3"],

@@ -30,7 +30,7 @@ SPREAD = 0.04  # sigma over which drawings are compared
 OTHER = 0.1  # share of a drawing that does not flank the view
 LEVEL = 2.0  # times as much as another: up to here the seam is free
 EVEN = 100.0  # squares of levels, as differences of colour: a pixel of seam, e times the count
-TOUCHING = 0.2  # of the smaller of two groups: what overlaps less is not one thing
+TOUCHING = 0.2  # of the smaller of two groups: those that overlap less are two things
 OUTDONE, MOSTLY = 1e-6, 1e-3  # counts of others, and least one, where one drawing shows all
 ISLAND = 2e-3  # of the squared height: smaller patches of one drawing tear what they lie in
 ENOUGH_PX = 260  # height at which drawings are chosen well enough
@@ -121,7 +121,7 @@ class Look:
 
 
 @dataclass(frozen=True)
-class Whole:
+class Shared:
     """Groups of features that both flanking drawings have, such as a face: one shows them.
 
     Attributes:
@@ -140,7 +140,7 @@ class Whole:
         return np.asarray(first | second)
 
 
-def whole_groups(looks: Sequence[Look]) -> list[Whole]:
+def shared_groups(looks: Sequence[Look]) -> list[Shared]:
     """Return the groups of features that both flanking drawings have, and who shows them.
 
     It is the drawing that shows what both have less stretched, by its share of the view.
@@ -165,7 +165,7 @@ def whole_groups(looks: Sequence[Look]) -> list[Whole]:
     for number in np.unique(part[pairs.row[kept]]):
         at = (part[own] == number) & (part[second] == number)
         groups = tuple(np.unique(own[at]).tolist()), tuple(np.unique(its[at]).tolist())
-        found.append(Whole(int(worth[1][at].sum() > worth[0][at].sum()), groups))
+        found.append(Shared(int(worth[1][at].sum() > worth[0][at].sum()), groups))
     return found
 
 
@@ -176,7 +176,7 @@ def _fineness(look: Look) -> Float[np.ndarray, "h w"]:
 
 
 def choose(
-    looks: Sequence[Look], within: Mask, figure_px: float, whole: Sequence[Whole] = ()
+    looks: Sequence[Look], within: Mask, figure_px: float, shared: Sequence[Shared] = ()
 ) -> tuple[Int[np.ndarray, "h w"], Float[np.ndarray, "looks h w"]]:
     """Return the drawing that every pixel shows, -1 where none does; and what each counts.
 
@@ -187,13 +187,13 @@ def choose(
         looks: the nearest first.
         within: pixels of the figure, over which features go on.
         figure_px: height of the figure.
-        whole: groups of features that one drawing shows.
+        shared: groups of features that one drawing shows.
     """
     step = max(1, int(figure_px // ENOUGH_PX))
     if step == 1:
-        return _choose(looks, within, figure_px, whole)
+        return _choose(looks, within, figure_px, shared)
     few = [look.every(step) for look in looks]
-    chosen, counts = _choose(few, within[::step, ::step], figure_px / step, whole)
+    chosen, counts = _choose(few, within[::step, ::step], figure_px / step, shared)
     rows, columns = within.shape
     size = (chosen.shape[1] * step, chosen.shape[0] * step)
     finer = [cv2.resize(one, size, interpolation=cv2.INTER_LINEAR) for one in counts]
@@ -205,7 +205,7 @@ def choose(
 
 
 def _choose(
-    looks: Sequence[Look], within: Mask, figure_px: float, whole: Sequence[Whole]
+    looks: Sequence[Look], within: Mask, figure_px: float, shared: Sequence[Shared]
 ) -> tuple[Int[np.ndarray, "h w"], Float[np.ndarray, "looks h w"]]:
     """Return what `choose` does, at the looks' own pixels."""
     trusts = [look.trust(figure_px) for look in looks]
@@ -217,7 +217,7 @@ def _choose(
         ]
     )
     counts += 1e-6 * np.stack([look.seen for look in looks])
-    for group in whole:
+    for group in shared:
         shown = group.region(looks) & looks[group.leader].seen
         others = np.arange(len(looks)) != group.leader
         counts[:, shown] *= np.where(others, OUTDONE, 1)[:, None]

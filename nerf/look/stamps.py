@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.camera import Camera
-from toonset.nerf.look.choose import Look, Whole
+from toonset.nerf.look.choose import Look, Shared
 from toonset.nerf.look.drawings import Texture
 from toonset.nerf.look.features import Feature, blots_of
 from toonset.nerf.look.paint_flow import between
@@ -65,7 +65,7 @@ def stamps(
     counts: Float[np.ndarray, "looks h w"],
     depth: Float[np.ndarray, "h w"],
     height: float,
-    whole: Sequence[Whole] = (),
+    shared: Sequence[Shared] = (),
 ) -> tuple[list[Stamp], list[Bool[np.ndarray, " features"]]]:
     """Return the features that a view shows, and which every drawing's paint has to go without.
 
@@ -77,7 +77,7 @@ def stamps(
         counts: what each counts there.
         depth: of the surface.
         height: of the figure, world units.
-        whole: groups of features that one drawing shows.
+        shared: groups of features that one drawing shows.
     """
     without = [np.zeros(len(look.texture.features.found) + 1, dtype=bool) for look in looks]
     alone: dict[tuple[int, int], _Place] = {}
@@ -88,7 +88,7 @@ def stamps(
             alone[number, place.number] = place
     shown = []
     pairs = _same_features(looks[0].texture, looks[1].texture, height) if both else []
-    for one in whole:  # as the one drawing has them, not in between
+    for one in shared:  # as the one drawing has them, not in between
         members = [
             [k for k, group in enumerate(look.texture.features.group_of, 1) if group in its]
             for look, its in zip(looks, one.groups, strict=False)

@@ -124,7 +124,7 @@ class LimbsRecord(BaseModel):
     @property
     def prefix(self) -> str:
         """Return how the names of its tensors begin."""
-        return f"limbs.{self.number}."
+        return _prefix(self.number)
 
 
 class DrawingsRecord(BaseModel):
@@ -199,8 +199,12 @@ def write_drawings(folder: Path, drawings: Drawings) -> None:
         tensors |= _triangles(drawings.shape)
     for i, view in enumerate(views):
         if view.limbs:
-            tensors |= _triangles(view.limbs, f"limbs.{i}.")
+            tensors |= _triangles(view.limbs, _prefix(i))
     write_bytes(folder / SURFACES, save({k: torch.from_numpy(v) for k, v in tensors.items()}))
+
+
+def _prefix(number: int) -> str:
+    return f"limbs.{number}."
 
 
 def _triangles(shape: Shape, prefix: str = "") -> dict[str, np.ndarray]:
@@ -242,9 +246,7 @@ def read_drawings(folder: Path, record: DrawingsRecord) -> Drawings:
     if shape is None:
         levels = [*_apart(found["depth"].numpy(), cameras)]
     parts = zip(cameras, rgba, paint, levels, strict=True)
-    limbs = {
-        own.number: _shape(own.shape, found, file, f"limbs.{own.number}.") for own in record.limbs
-    }
+    limbs = {own.number: _shape(own.shape, found, file, own.prefix) for own in record.limbs}
     views = tuple(
         Drawing(
             camera, own, flat[..., :3], level, i in record.mirrored, originals.get(i), limbs.get(i)

@@ -21,7 +21,7 @@ from tests.nerf.look.painted import (
     unseen,
     with_an_arm,
 )
-from toonset.nerf.look.blend import DRAWN, GUESSED, MIRRORED, _gone_on, blend_view, flanking
+from toonset.nerf.look.blend import DRAWN, GUESSED, MIRRORED, _extended, blend_view, flanking
 from toonset.nerf.look.drawings import Drawings, Original
 from toonset.nerf.look.outline import Outline
 from toonset.nerf.render.layers import color_picture
@@ -253,7 +253,7 @@ def test_paint_goes_on_beyond_a_line_and_the_line_does_not() -> None:
     labels = np.zeros((40, 60), np.uint8)
     labels[:, 28:32] = 1
     kept = np.broadcast_to(np.arange(60) < 32, (40, 60))
-    filled, own = _gone_on(found, kept, color, labels, 1.0)
+    filled, own = _extended(found, kept, color, labels, 1.0)
     np.testing.assert_array_equal(filled[:, :32], color[:, :32])
     assert np.abs(filled[:, 32:] - 0.8).max() < 1e-6
     assert (own[:, 32:] == 0).all()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from toonset.nerf.look.blend import _afloat
-from toonset.nerf.look.choose import Look, choose, whole_groups
+from toonset.nerf.look.choose import Look, choose, shared_groups
 
 SIZE = 120
 Y, X = (axis.astype(np.float32) for axis in np.mgrid[:SIZE, :SIZE])
@@ -65,7 +65,7 @@ def face_at(share: float, middle: int, stretched: float = 1.0) -> Look:
 
 def test_a_face_that_two_drawings_put_in_two_places_is_one_drawings() -> None:
     looks = [face_at(0.52, 54), face_at(0.48, 66)]
-    (whole,) = whole_groups(looks)
+    (whole,) = shared_groups(looks)
     assert (whole.leader, whole.groups) == (0, ((1,), (1,)))
     both = (looks[0].group > 0) | (looks[1].group > 0)
     assert (whole.region(looks) == both).all()
@@ -74,10 +74,10 @@ def test_a_face_that_two_drawings_put_in_two_places_is_one_drawings() -> None:
 
 
 def test_the_face_that_is_stretched_less_leads() -> None:
-    (whole,) = whole_groups([face_at(0.55, 60, stretched=2.0), face_at(0.45, 60)])
+    (whole,) = shared_groups([face_at(0.55, 60, stretched=2.0), face_at(0.45, 60)])
     assert whole.leader == 1
 
 
 @pytest.mark.parametrize("middles", [(30, 90), (42, 78)])
 def test_faces_apart_or_just_touching_are_nobodys_business(middles: tuple[int, int]) -> None:
-    assert whole_groups([face_at(0.5, middle) for middle in middles]) == []
+    assert shared_groups([face_at(0.5, middle) for middle in middles]) == []

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from toonset.camera import Camera
-from toonset.nerf.look.choose import Look, Whole
+from toonset.nerf.look.choose import Look, Shared
 from toonset.nerf.look.features import Features, features_of
 from toonset.nerf.look.stamps import stamped, stamps, torn
 
@@ -187,7 +187,7 @@ def test_the_features_of_a_face_are_one_group_and_a_button_is_another() -> None:
 def test_a_face_that_one_drawing_shows_keeps_its_own_places_and_loses_the_others() -> None:
     own, its = face((75, 60), (105, 60)), face((85, 60), (115, 60))
     looks = [look_at(own, 0.6), look_at(its, 0.4)]
-    whole = Whole(0, ((1,), (1,)))
+    whole = Shared(0, ((1,), (1,)))
     chosen = np.zeros(FACE.shape, int)
     counts = np.stack([np.full(FACE.shape, look.share, np.float32) for look in looks])
     depth = np.zeros(FACE.shape, np.float32)
