@@ -54,6 +54,7 @@ OWN, OWN_BENT = 0.12, 0.04
 # Of the height, and pixels, beside the nearest drawing: what lies farther from it is not shown
 BEYOND, BESIDE_PX = 0.01, 2
 AFLOAT = 0.25  # share of what floats beside a figure: so much of it has to in a drawing, too
+LEGS = 0.1  # of the figure: what is larger stays, though nothing joins it
 DRAWN, MIRRORED, GUESSED = 0, 1, 2  # where a pixel's paint comes from
 SOURCES = ("drawn", "mirrored", "guessed")
 Box = tuple[slice, slice]  # rows and columns
@@ -404,6 +405,7 @@ def _afloat(solid: Bool[np.ndarray, "h w"], looks: list[Look]) -> Bool[np.ndarra
         )
         share = np.bincount(part.ravel(), ((afloat > 0) & look.seen).ravel(), len(areas)) / areas
         kept = np.maximum(kept, share)
+    kept[areas > LEGS * areas[1:].sum()] = 1
     kept[0] = kept[1 + int(areas[1:].argmax())] = 1
     off = (kept < AFLOAT)[part]
     return dilate(off, 2) & (off | ~solid)

@@ -51,6 +51,13 @@ def test_a_hand_that_floats_goes_unless_a_drawing_shows_it_so() -> None:
     assert not _afloat(solid, [look_at(paint, 0.5), look_at(paint, 0.5, hand)]).any()
 
 
+def test_legs_that_a_gap_parts_from_the_body_stay() -> None:
+    solid = np.zeros(INSIDE.shape, bool)
+    solid[10:70, 30:60] = solid[73:110, 35:45] = True
+    paint = np.zeros((*INSIDE.shape, 3), np.float32)
+    assert not _afloat(solid, [look_at(paint, 1.0)]).any()
+
+
 def face_at(share: float, middle: int, stretched: float = 1.0) -> Look:
     """Return a view of a drawing with a face of 40 pixels round a column."""
     groups = (np.hypot(X - middle, Y - 60) < 20).astype(np.int16)
