@@ -31,6 +31,7 @@ from toonset.nerf.hull.tolerance import HullEvidence
 from toonset.nerf.kernels import loss_terms as terms
 from toonset.nerf.kernels.threads import SIDES
 from toonset.nerf.options import STEPS_ON_SECTIONS, STEPS_ON_SHAPE, USUAL_STEPS, TrainOptions
+from toonset.nerf.prepare.outlines import without_outlines
 from toonset.nerf.prepare.paint_agreement import Depths
 from toonset.nerf.prepare.prepare import Prepared, agree_on_paint, prepare
 from toonset.nerf.prepare.smaller import at_most
@@ -109,6 +110,8 @@ def fit_field(
     if options.carve and agree:
         ready = agree_on_paint(ready, _depths(ready, hull), _height(hull))
     scene = at_most(add_mirrored_views(ready.scene, symmetry), FITTED_PX)
+    if not ready.compared:  # few drawings
+        scene = without_outlines(scene)
     clock.append(time.perf_counter())
     weights, choice = _weights(options, len(scene.frames), agree=ready.agree), None
     if options.field == "auto" and options.resolution is None and field_of is None:
