@@ -114,6 +114,7 @@ def test_demo_goes_on_after_an_uncertain_view(checkout: Path) -> None:
         "[palette",
         "[train",
         "[render",
+        "[view",
     ]
     assert "$ ./run calibrate examples/sheet.png" in done.stdout
     assert "weak or ambiguous" in done.stderr

@@ -12,7 +12,7 @@ def summary(run: Path, metrics: dict[str, Any], verbose: bool = False) -> str:
     fit, seconds = metrics["train"], sum(metrics["seconds"].values())
     counts = metrics["counts"]
     size = f", {counts['rays']} rays, {counts['parameters']} parameters" if verbose else ""
-    after = ["toonset", "render", str(run), "--turntable", "36", "-o", "turntable"]
+    after = ["toonset", "view", str(run)]
     held_out = [f"held-out views: {_figures(metrics['test'])}"] if metrics["test"] else []
     return "\n".join(
         [

@@ -66,7 +66,7 @@ def test_evidence_is_for_those_who_ask() -> None:
         "drawings bent back: outlines 1.00 px apart, 0.50 px after",
         "fit to the drawings as set right: PSNR 30.00 dB",
         "verdict: weak",
-        "run: look at preview.png; next: toonset render run --turntable 36 -o turntable",
+        "run: look at preview.png; next: toonset view run",
     ]
 
 
