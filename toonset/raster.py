@@ -109,6 +109,16 @@ def nearest(
     return rows, columns
 
 
+def taken(
+    picture: Shaped[np.ndarray, "height width *bands"], at: tuple[Places, Places]
+) -> Shaped[np.ndarray, "height width *bands"]:
+    """Return `picture[at]`, rows and columns of the picture, several times as fast."""
+    rows, columns = at
+    height, width = picture.shape[:2]
+    flat = picture.reshape(height * width, *picture.shape[2:])
+    return flat.take(rows * np.int64(width) + columns, axis=0)
+
+
 def from_nearest(
     values: Shaped[np.ndarray, "height width *bands"], known: Mask
 ) -> Shaped[np.ndarray, "height width *bands"]:

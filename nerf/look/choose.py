@@ -21,7 +21,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.nerf.look.drawings import Texture, sample_picture
 from toonset.nerf.look.outline import without_crumbs
-from toonset.raster import broad_blur, dilate, nearest
+from toonset.raster import broad_blur, dilate, nearest, taken
 
 EDGE = 0.02  # of the figure's height, as all lengths: so near to a drawing's edges it counts less
 LEAST_TRUST = 0.1
@@ -331,4 +331,4 @@ def filled_from(marked: Mask, *pictures: np.ndarray) -> list[np.ndarray]:
     if marked.all() or not marked.any():
         return [*pictures]
     at = nearest(marked)
-    return [picture[at] for picture in pictures]
+    return [taken(picture, at) for picture in pictures]

@@ -145,6 +145,8 @@ def without_crumbs(
 ) -> Bool[np.ndarray, "height width"]:
     """Return a mask without patches of fewer pixels, and holes of fewer than `hole_px`."""
     for value, least in ((True, least_px), (False, least_px if hole_px is None else hole_px)):
+        if least <= 1:  # no part is smaller
+            continue
         part, areas = sized_parts(mask if value else ~mask, connectivity=4)
         small = areas < least
         small[0] = False

@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from toonset.nerf.look.drawings import crisp
-from toonset.raster import nearest
+from toonset.raster import nearest, taken
 
 # Of the figure's height: depths this far apart belong to two surfaces, in one round after another
 LEVELS = (0.0375, 0.05, 0.075)
@@ -42,11 +42,11 @@ def smooth_surface(depth: Depth, height: float, figure_px: float) -> Float[np.nd
     if not there.any():
         return np.zeros(depth.shape, np.float32)
     at = nearest(there)
-    depth, grid = crisp(depth[at].astype(np.float32)), _Grid.of(there, figure_px)
+    depth, grid = crisp(taken(depth, at).astype(np.float32)), _Grid.of(there, figure_px)
     for level in LEVELS:
         depth = grid.smoothed(depth, level * height)
     if not there.all():
-        far = cv2.GaussianBlur(depth[at].astype(np.float32), (0, 0), BEYOND * figure_px)
+        far = cv2.GaussianBlur(taken(depth, at).astype(np.float32), (0, 0), BEYOND * figure_px)
         depth = np.where(there, depth, far)
     return depth.astype(np.float32)
 
