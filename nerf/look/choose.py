@@ -35,6 +35,7 @@ OUTDONE, MOSTLY = 1e-6, 1e-3  # counts of others, and least one, where one drawi
 ISLAND = 2e-3  # of the squared height: smaller patches of one drawing tear what they lie in
 ENOUGH_PX = 260  # height at which drawings are chosen well enough
 LIKE = 0.2  # of a channel: colours of two drawings that are nearer than this are averaged
+ROW = 64  # pixels that are looked up in a row
 
 Mask = Bool[np.ndarray, "h w"]
 
@@ -66,6 +67,12 @@ class Look:
             np.ascontiguousarray(at[::step, ::step]) for at in (self.x, self.y, self.seen)
         )
         return Look(self.texture, x, y, seen, self.share, self.scale / step)
+
+    def at(self, pixels: Int[np.ndarray, "rows columns"]) -> Look:
+        """Return the same of some pixels, which are numbered row after row."""
+        return replace(
+            self, x=self.x.take(pixels), y=self.y.take(pixels), seen=self.seen.take(pixels)
+        )
 
     def bare(self, without: Bool[np.ndarray, " features"]) -> Look:
         """Return the same, without some features in its paint."""
@@ -309,21 +316,30 @@ def mixed(
     """
     color = np.zeros((*chosen.shape, 3), np.float32)
     label = np.zeros(chosen.shape, np.uint8)
-    used = [number for number in range(len(looks)) if (chosen == number).any()]
-    for number in used:
-        own, look = (chosen == number).view(np.uint8), looks[number]
-        color, label = cv2.copyTo(look.paint, own, color), cv2.copyTo(look.label, own, label)
-    most = np.take_along_axis(counts, chosen.clip(0)[None], 0)[0]
-    total, weights = color.copy(), np.ones(chosen.shape, np.float32)
-    for number in used if len(used) > 1 else ():
-        picture = looks[number].paint
-        red, green, blue = cv2.split(cv2.absdiff(picture, color))
+    at = _in_rows(np.flatnonzero(chosen >= 0))
+    own = chosen.take(at)
+    used = [number for number in range(len(looks)) if (own == number).any()]
+    few = {number: looks[number].at(at) for number in used}
+    shown, name = np.zeros((*at.shape, 3), np.float32), np.zeros(at.shape, np.uint8)
+    for number, look in few.items():
+        here = (own == number).view(np.uint8)
+        shown, name = cv2.copyTo(look.paint, here, shown), cv2.copyTo(look.label, here, name)
+    total, weights = shown.copy(), np.ones(at.shape, np.float32)
+    most = counts.reshape(len(looks), -1)[own, at]
+    for number, look in few.items() if len(used) > 1 else ():
+        red, green, blue = cv2.split(cv2.absdiff(look.paint, shown))
         like = (1 - cv2.max(cv2.max(red, green), blue) / LIKE).clip(0, 1)
-        like *= (chosen != number) & (chosen >= 0)
-        weight = like * (counts[number] / np.maximum(most, 1e-6)).clip(0, 1).astype(np.float32)
-        total += weight[..., None] * picture
+        like *= own != number
+        weight = like * (counts[number].take(at) / np.maximum(most, 1e-6)).clip(0, 1)
+        total += weight[..., None] * look.paint
         weights += weight
-    return total / weights[..., None], label
+    color.reshape(-1, 3)[at], label.reshape(-1)[at] = total / weights[..., None], name
+    return color, label
+
+
+def _in_rows(pixels: Int[np.ndarray, " n"]) -> Int[np.ndarray, "rows columns"]:
+    """Return numbers of pixels in rows, as OpenCV takes them; the last one fills up its row."""
+    return np.pad(pixels, (0, -len(pixels) % ROW), mode="edge" if len(pixels) else "empty").reshape(-1, ROW)
 
 
 def filled_from(marked: Mask, *pictures: np.ndarray) -> list[np.ndarray]:
