@@ -21,7 +21,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.nerf.look.drawings import Texture, sample_picture
 from toonset.nerf.look.outline import without_crumbs
-from toonset.raster import broad_blur, dilate, nearest, taken
+from toonset.raster import broad_blur, dilate, in_rows, nearest, taken
 
 EDGE = 0.02  # of the figure's height, as all lengths: so near to a drawing's edges it counts less
 LEAST_TRUST = 0.1
@@ -35,7 +35,6 @@ OUTDONE, MOSTLY = 1e-6, 1e-3  # counts of others, and least one, where one drawi
 ISLAND = 2e-3  # of the squared height: smaller patches of one drawing tear what they lie in
 ENOUGH_PX = 260  # height at which drawings are chosen well enough
 LIKE = 0.2  # of a channel: colours of two drawings that are nearer than this are averaged
-ROW = 64  # pixels that are looked up in a row
 
 Mask = Bool[np.ndarray, "h w"]
 
@@ -229,7 +228,11 @@ def _choose(
         others = np.arange(len(looks)) != group.leader
         counts[:, shown] *= np.where(others, OUTDONE, 1)[:, None]
         counts[group.leader][shown] = np.maximum(counts[group.leader][shown], MOSTLY)
-    best = np.where(counts.max(axis=0) > 0, counts.argmax(axis=0), -1)
+    best = np.where(counts[0] > 0, 0, -1)
+    most = counts[0]
+    for number in range(1, len(looks)):
+        best[counts[number] > most] = number
+        most = np.maximum(most, counts[number])
     best = _without_islands(best, within, ISLAND * figure_px**2)
     if len(looks) == 1:
         return best, counts
@@ -316,7 +319,7 @@ def mixed(
     """
     color = np.zeros((*chosen.shape, 3), np.float32)
     label = np.zeros(chosen.shape, np.uint8)
-    at = _in_rows(np.flatnonzero(chosen >= 0))
+    at = in_rows(np.flatnonzero(chosen >= 0))
     own = chosen.take(at)
     used = [number for number in range(len(looks)) if (own == number).any()]
     few = {number: looks[number].at(at) for number in used}
@@ -335,11 +338,6 @@ def mixed(
         weights += weight
     color.reshape(-1, 3)[at], label.reshape(-1)[at] = total / weights[..., None], name
     return color, label
-
-
-def _in_rows(pixels: Int[np.ndarray, " n"]) -> Int[np.ndarray, "rows columns"]:
-    """Return numbers of pixels in rows, as OpenCV takes them; the last one fills up its row."""
-    return np.pad(pixels, (0, -len(pixels) % ROW), mode="edge" if len(pixels) else "empty").reshape(-1, ROW)
 
 
 def filled_from(marked: Mask, *pictures: np.ndarray) -> list[np.ndarray]:
