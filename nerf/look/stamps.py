@@ -152,12 +152,13 @@ def _same_features(first: Texture, second: Texture, height: float) -> list[tuple
 
     Hands and cameras err sideways, where nothing holds a drawing, more than in height.
 
-    Source: linear assignment, Crouse 2016 (`scipy.optimize.linear_sum_assignment`).
+    Source: sparse linear assignment, Jonker and Volgenant 1987 (`scipy.sparse.csgraph`).
     """
     sides = [texture.features.found for texture in (first, second)]
     if not all(sides):
         return []
-    from scipy.optimize import linear_sum_assignment
+    from scipy.sparse import csr_array  # loaded for seams already, unlike scipy.optimize
+    from scipy.sparse.csgraph import min_weight_full_bipartite_matching
 
     half_way = between(first.camera, second.camera, 1.0, height)
     at, other = (half_way.project(texture.anchors)[0] for texture in (first, second))
@@ -169,7 +170,8 @@ def _same_features(first: Texture, second: Texture, height: float) -> list[tuple
     larger = np.abs(area[0][:, None] - area[1][None]) / np.log(SIZES)
     terms = np.dstack([apart, unlike, larger])
     price = np.where((terms < 1).all(axis=-1), (terms**2).sum(axis=-1) - terms.shape[-1], 0)
-    found = zip(*linear_sum_assignment(price), strict=True)
+    matched = min_weight_full_bipartite_matching(csr_array(price - 1))  # 0 would be no edge
+    found = zip(*matched, strict=True)
     return [(int(i) + 1, int(j) + 1) for i, j in found if price[i, j] < 0]
 
 
