@@ -111,7 +111,7 @@ def nearest(
 
 
 def in_rows(pixels: Int[np.ndarray, " n"]) -> Int[np.ndarray, "rows columns"]:
-    """Return numbers of pixels in rows, as OpenCV's `remap` takes them; the last one is repeated."""
+    """Return numbers of pixels in rows, as OpenCV's `remap` takes them; the last is repeated."""
     if not len(pixels):
         return pixels.reshape(0, ROW)
     return np.pad(pixels, (0, -len(pixels) % ROW), mode="edge").reshape(-1, ROW)

@@ -209,7 +209,9 @@ def _places(
     steps = [_slope(look.x, y, x, 1), _slope(look.x, y, x, 0), _slope(look.y, y, x, 0)]
     levels = [_medians(each, numbers, pixels)[index] for each in (*steps, depth[y, x])]
     values = (x, y, *(each[y, x] for each in (look.x, look.y, counts, own)))
-    means = [(np.bincount(numbers, each, len(hidden)) / np.maximum(pixels, 1))[index] for each in values]
+    means = [
+        (np.bincount(numbers, each, len(hidden)) / np.maximum(pixels, 1))[index] for each in values
+    ]
     found = []
     for place, k in enumerate(index.tolist()):
         feature = features.found[k - 1]
@@ -231,10 +233,7 @@ def _places(
 
 
 def _slope(
-    picture: Float[np.ndarray, "h w"],
-    y: Int[np.ndarray, " n"],
-    x: Int[np.ndarray, " n"],
-    axis: int,
+    picture: Float[np.ndarray, "h w"], y: Int[np.ndarray, " n"], x: Int[np.ndarray, " n"], axis: int
 ) -> Float[np.ndarray, " n"]:
     """Return `np.gradient` of a picture along an axis, at some pixels."""
     at, last = (y, x)[axis], picture.shape[axis] - 1

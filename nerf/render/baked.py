@@ -85,7 +85,8 @@ class Baked:
             parts = (np.pad(density, 1, mode="edge"), np.pad(hull.support, 1))
             count = len(parts[0])
             return Slices.of(
-                lambda x: cv2.merge([part[at % count] for at in (x, x + 1) for part in parts]), count
+                lambda x: cv2.merge([part[at % count] for at in (x, x + 1) for part in parts]),
+                count,
             )
 
         def colors() -> Slices:

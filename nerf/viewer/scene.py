@@ -112,7 +112,9 @@ def picture_record(picture: Picture, shrink: int = 1) -> dict[str, Any] | None:
     rows, columns = (np.flatnonzero(picture[..., 3].any(axis=axis)) for axis in (1, 0))
     if not len(rows):
         return None
-    top, left, bottom, right = (int(at) for at in (rows[0], columns[0], rows[-1] + 1, columns[-1] + 1))
+    top, left, bottom, right = (
+        int(at) for at in (rows[0], columns[0], rows[-1] + 1, columns[-1] + 1)
+    )
     box = [shrink * side for side in (left, top, right - left, bottom - top)]
     part = picture[top:bottom, left:right]
     return {"box": box, "picture": webp(part, **(SMALL if shrink > 1 else {}))}
@@ -130,9 +132,12 @@ def webp(
 
 
 def smaller(picture: Picture, shrink: int) -> Picture:
-    """Return a picture `shrink` times as small along each axis; transparent pixels lend no colour."""
+    """Return a picture made `shrink` times smaller; transparent pixels lend no colour."""
     height, width = (-(-side // shrink) for side in picture.shape[:2])
-    room = [(0, shrink * size - side) for size, side in zip((height, width), picture.shape, strict=False)]
+    room = [
+        (0, shrink * size - side)
+        for size, side in zip((height, width), picture.shape, strict=False)
+    ]
     whole = np.pad(picture, [*room, (0, 0)])
     alpha = whole[..., 3:].astype(np.float32)
     both = cv2.resize(
