@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
 
+ROW = 64  # pixels in a row of `in_rows`
 BROAD = 3.0  # pixels of a smaller copy that a blur's sigma keeps
 LONG_REACH = 24  # pixels, from which on OpenCV's distances are as fast
 
@@ -107,6 +108,23 @@ def nearest(
     places = distance_transform_edt(~marked, return_distances=False, return_indices=True)
     rows, columns = np.asarray(places)
     return rows, columns
+
+
+def in_rows(pixels: Int[np.ndarray, " n"]) -> Int[np.ndarray, "rows columns"]:
+    """Return numbers of pixels in rows, as OpenCV's `remap` takes them; the last is repeated."""
+    if not len(pixels):
+        return pixels.reshape(0, ROW)
+    return np.pad(pixels, (0, -len(pixels) % ROW), mode="edge").reshape(-1, ROW)
+
+
+def taken(
+    picture: Shaped[np.ndarray, "height width *bands"], at: tuple[Places, Places]
+) -> Shaped[np.ndarray, "height width *bands"]:
+    """Return `picture[at]`, rows and columns of the picture, several times as fast."""
+    rows, columns = at
+    height, width = picture.shape[:2]
+    flat = picture.reshape(height * width, *picture.shape[2:])
+    return flat.take(rows * np.int64(width) + columns, axis=0)
 
 
 def from_nearest(

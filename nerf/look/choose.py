@@ -21,7 +21,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.nerf.look.drawings import Texture, sample_picture
 from toonset.nerf.look.outline import without_crumbs
-from toonset.raster import broad_blur, dilate, nearest
+from toonset.raster import broad_blur, dilate, in_rows, nearest, taken
 
 EDGE = 0.02  # of the figure's height, as all lengths: so near to a drawing's edges it counts less
 LEAST_TRUST = 0.1
@@ -66,6 +66,12 @@ class Look:
             np.ascontiguousarray(at[::step, ::step]) for at in (self.x, self.y, self.seen)
         )
         return Look(self.texture, x, y, seen, self.share, self.scale / step)
+
+    def at(self, pixels: Int[np.ndarray, "rows columns"]) -> Look:
+        """Return the same of some pixels, which are numbered row after row."""
+        return replace(
+            self, x=self.x.take(pixels), y=self.y.take(pixels), seen=self.seen.take(pixels)
+        )
 
     def bare(self, without: Bool[np.ndarray, " features"]) -> Look:
         """Return the same, without some features in its paint."""
@@ -222,7 +228,11 @@ def _choose(
         others = np.arange(len(looks)) != group.leader
         counts[:, shown] *= np.where(others, OUTDONE, 1)[:, None]
         counts[group.leader][shown] = np.maximum(counts[group.leader][shown], MOSTLY)
-    best = np.where(counts.max(axis=0) > 0, counts.argmax(axis=0), -1)
+    best = np.where(counts[0] > 0, 0, -1)
+    most = counts[0]
+    for number in range(1, len(looks)):
+        best[counts[number] > most] = number
+        most = np.maximum(most, counts[number])
     best = _without_islands(best, within, ISLAND * figure_px**2)
     if len(looks) == 1:
         return best, counts
@@ -309,21 +319,25 @@ def mixed(
     """
     color = np.zeros((*chosen.shape, 3), np.float32)
     label = np.zeros(chosen.shape, np.uint8)
-    used = [number for number in range(len(looks)) if (chosen == number).any()]
-    for number in used:
-        own, look = (chosen == number).view(np.uint8), looks[number]
-        color, label = cv2.copyTo(look.paint, own, color), cv2.copyTo(look.label, own, label)
-    most = np.take_along_axis(counts, chosen.clip(0)[None], 0)[0]
-    total, weights = color.copy(), np.ones(chosen.shape, np.float32)
-    for number in used if len(used) > 1 else ():
-        picture = looks[number].paint
-        red, green, blue = cv2.split(cv2.absdiff(picture, color))
+    at = in_rows(np.flatnonzero(chosen >= 0))
+    own = chosen.take(at)
+    used = [number for number in range(len(looks)) if (own == number).any()]
+    few = {number: looks[number].at(at) for number in used}
+    shown, name = np.zeros((*at.shape, 3), np.float32), np.zeros(at.shape, np.uint8)
+    for number, look in few.items():
+        here = (own == number).view(np.uint8)
+        shown, name = cv2.copyTo(look.paint, here, shown), cv2.copyTo(look.label, here, name)
+    total, weights = shown.copy(), np.ones(at.shape, np.float32)
+    most = counts.reshape(len(looks), -1)[own, at]
+    for number, look in few.items() if len(used) > 1 else ():
+        red, green, blue = cv2.split(cv2.absdiff(look.paint, shown))
         like = (1 - cv2.max(cv2.max(red, green), blue) / LIKE).clip(0, 1)
-        like *= (chosen != number) & (chosen >= 0)
-        weight = like * (counts[number] / np.maximum(most, 1e-6)).clip(0, 1).astype(np.float32)
-        total += weight[..., None] * picture
+        like *= own != number
+        weight = like * (counts[number].take(at) / np.maximum(most, 1e-6)).clip(0, 1)
+        total += weight[..., None] * look.paint
         weights += weight
-    return total / weights[..., None], label
+    color.reshape(-1, 3)[at], label.reshape(-1)[at] = total / weights[..., None], name
+    return color, label
 
 
 def filled_from(marked: Mask, *pictures: np.ndarray) -> list[np.ndarray]:
@@ -331,4 +345,4 @@ def filled_from(marked: Mask, *pictures: np.ndarray) -> list[np.ndarray]:
     if marked.all() or not marked.any():
         return [*pictures]
     at = nearest(marked)
-    return [picture[at] for picture in pictures]
+    return [taken(picture, at) for picture in pictures]

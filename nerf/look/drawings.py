@@ -19,7 +19,7 @@ from toonset.nerf.look.shade import Shade
 from toonset.nerf.look.silhouette import Rim, rim_of
 from toonset.nerf.look.step_lines import StepLines, step_edges
 from toonset.palette.palette import Shadow
-from toonset.raster import depth_inside, distance_to, nearest, sized_parts
+from toonset.raster import depth_inside, distance_to, nearest, sized_parts, taken
 
 STEP = 0.03  # of the figure's height: surfaces so far apart in depth are two
 FACES = 2  # times as far behind: hair bulges over faces, which stay whole
@@ -435,8 +435,10 @@ def places_in(
 
     The first pixel's centre is at 0; points behind a pinhole lie far beyond the picture.
     """
-    pixels, depth, front = camera.project(points)
-    x, y = (np.nan_to_num(pixels[..., k] - 0.5, nan=-1e4).astype(np.float32) for k in (0, 1))
+    pixels, depth, front = camera.project_grid(points)
+    x, y = (pixels - 0.5).astype(np.float32)
+    if not front.all():
+        x, y = (np.nan_to_num(at, nan=-1e4) for at in (x, y))
     return (x, y), depth, front
 
 
@@ -452,7 +454,7 @@ def filled(depth: Float[np.ndarray, "height width"]) -> Float[np.ndarray, "heigh
     seen = np.isfinite(depth)
     if not seen.any():
         return np.zeros(depth.shape, dtype=np.float32)
-    return depth[nearest(seen)].astype(np.float32)
+    return taken(depth, nearest(seen)).astype(np.float32)
 
 
 def crisp_depth(depth: Float[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:

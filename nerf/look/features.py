@@ -154,7 +154,9 @@ def lines_of(picture: Picture, pen: tuple[float, tuple[int, int, int]] | None) -
     lined = np.zeros(picture.shape[:2], dtype=bool)
     if pen:
         width, rgb = pen
-        inky = np.abs(picture * 255 - np.array(rgb, np.float32)).max(axis=2) < INK_LIKE
+        inky = np.ones(lined.shape, dtype=bool)
+        for channel, level in zip(cv2.split(picture), rgb, strict=True):
+            inky &= np.abs(channel * 255 - np.float32(level)) < INK_LIKE
         thick = depth_inside(inky) > THICK * width  # is paint
         lined = dilate(inky & (distance_to(thick) > (THICK + 1) * width if thick.any() else True))
     return lined
@@ -236,19 +238,21 @@ def blots_of(
         most_px: their area is smaller than each of these.
         step: between the levels at which they are looked for.
     """
-    rim = inside & ~erode(inside)
+    rim = np.flatnonzero(inside & ~erode(inside))
     marked = [np.zeros(inside.shape, dtype=bool) for _ in most_px]
     for channel in channels:
         for values in (channel, 255 - channel):
             for level in range(CONTRAST, 256, step):
                 part, areas = sized_parts((values <= level) & inside)
-                at_rim = part[rim]
+                if len(areas) < 2:
+                    continue
+                at_rim = part.take(rim)
                 for most, found in zip(most_px, marked, strict=True):
                     few = areas < most
                     few[at_rim] = False
                     few[0] = False
                     if few.any():
-                        found |= few[part] & (values <= level - CONTRAST)
+                        found |= few.take(part) & (values <= level - CONTRAST)
     return marked
 
 

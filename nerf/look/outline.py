@@ -20,6 +20,7 @@ SMOOTH = 0.7 / 260  # sigma over the figure's height: what is finer in a field's
 CRUMB_PX = 30  # area of parts and holes that are noise, in a figure of CRUMB_AT px
 HOLE_PX = 80  # of holes in a field's outline: hulls of capes are torn
 CRUMB_AT = 260.0
+BESIDE_PX = 4  # round an outline: enlarging by cubic curves reaches two pixels
 BAND_PX = 2.0  # beyond the outline, in which its soft side lies
 
 Picture = UInt8[np.ndarray, "height width 4"]
@@ -96,10 +97,32 @@ def inked_outline(
         width_px: of the line; 0: none.
         figure_px: height of the figure.
     """
-    finer = _finer(figure_px)
-    size = (finer * inside_px.shape[1], finer * inside_px.shape[0])
-    fine = finer * cv2.resize(inside_px, size, interpolation=cv2.INTER_CUBIC)
-    return _drawn(fine > 0, (fine + 0.5).clip(0, 1), width_px, figure_px, HOLE_PX)
+    finer, box = _finer(figure_px), _box_of(inside_px)
+    part = np.ascontiguousarray(inside_px[box])
+    size = (finer * part.shape[1], finer * part.shape[0])
+    fine = cv2.resize(part, size, interpolation=cv2.INTER_CUBIC)
+    fine *= finer
+    solid = fine > 0
+    fine += 0.5
+    found = _drawn(solid, np.clip(fine, 0, 1, out=fine), width_px, figure_px, HOLE_PX)
+    cover, ink = np.zeros((2, *inside_px.shape), np.float32)
+    cover[box], ink[box] = found
+    return cover, ink
+
+
+def _box_of(inside_px: Float[np.ndarray, "height width"]) -> tuple[slice, slice]:
+    """Return the rows and columns of all that is near or within an outline, with room all round.
+
+    It is the whole picture if the figure comes near its edge.
+    """
+    near = inside_px > -BESIDE_PX
+    sides = []
+    for axis in (1, 0):
+        found = np.flatnonzero(near.any(axis=axis))
+        if not len(found) or found[0] < BESIDE_PX or found[-1] + BESIDE_PX >= near.shape[1 - axis]:
+            return slice(None), slice(None)
+        sides.append(slice(int(found[0]) - BESIDE_PX, int(found[-1]) + 1 + BESIDE_PX))
+    return sides[0], sides[1]
 
 
 def without_noise(
@@ -130,12 +153,15 @@ def _drawn(
     size = (solid.shape[1] // finer, solid.shape[0] // finer)
     noise = (finer * figure_px / CRUMB_AT) ** 2
     inside = without_crumbs(solid, CRUMB_PX * noise, hole_px * noise)
-    cover = np.where(inside == solid, cover, inside).astype(np.float32)
+    if inside is not solid:
+        cover = np.where(inside == solid, cover, inside).astype(np.float32)
     ink = np.zeros(size[::-1], np.float32)
     if width_px > 0:
         reach = finer * width_px + 0.5
         depth = np.maximum(depth_near_edge(inside, math.ceil(reach + 0.5)), 0)
-        line = np.clip(reach - depth, 0, 1) * cover
+        line = np.subtract(np.float32(reach), depth, out=depth)
+        line = np.clip(line, 0, 1, out=line)
+        line *= cover
         ink = cv2.resize(line, size, interpolation=cv2.INTER_AREA)
     return cv2.resize(cover, size, interpolation=cv2.INTER_AREA), ink
 
@@ -145,6 +171,8 @@ def without_crumbs(
 ) -> Bool[np.ndarray, "height width"]:
     """Return a mask without patches of fewer pixels, and holes of fewer than `hole_px`."""
     for value, least in ((True, least_px), (False, least_px if hole_px is None else hole_px)):
+        if least <= 1:  # no part is smaller
+            continue
         part, areas = sized_parts(mask if value else ~mask, connectivity=4)
         small = areas < least
         small[0] = False

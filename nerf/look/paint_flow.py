@@ -84,7 +84,7 @@ def _pair_flow(drawings: Drawings, pair: tuple[int, int], depth_of: Depths) -> P
     first, second = (drawings.textures[i] for i in pair)
     camera = between(first.camera, second.camera, GRID, drawings.height)
     depth = drawings.shape.seen(camera).depth if drawings.shape else depth_of(camera)
-    points = camera.unproject(camera.pixel_grid(), crisp_depth(depth))
+    points = camera.unproject_grid(crisp_depth(depth))
     slack, least = STEP * drawings.height, CRUMB * GRID**2
     there = np.isfinite(depth)
     seen = [look_up(texture, points, slack, least) for texture in (first, second)]

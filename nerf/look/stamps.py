@@ -152,12 +152,13 @@ def _same_features(first: Texture, second: Texture, height: float) -> list[tuple
 
     Hands and cameras err sideways, where nothing holds a drawing, more than in height.
 
-    Source: linear assignment, Crouse 2016 (`scipy.optimize.linear_sum_assignment`).
+    Source: sparse linear assignment, Jonker and Volgenant 1987 (`scipy.sparse.csgraph`).
     """
     sides = [texture.features.found for texture in (first, second)]
     if not all(sides):
         return []
-    from scipy.optimize import linear_sum_assignment
+    from scipy.sparse import csr_array  # loaded for seams already, unlike scipy.optimize
+    from scipy.sparse.csgraph import min_weight_full_bipartite_matching
 
     half_way = between(first.camera, second.camera, 1.0, height)
     at, other = (half_way.project(texture.anchors)[0] for texture in (first, second))
@@ -169,7 +170,8 @@ def _same_features(first: Texture, second: Texture, height: float) -> list[tuple
     larger = np.abs(area[0][:, None] - area[1][None]) / np.log(SIZES)
     terms = np.dstack([apart, unlike, larger])
     price = np.where((terms < 1).all(axis=-1), (terms**2).sum(axis=-1) - terms.shape[-1], 0)
-    found = zip(*linear_sum_assignment(price), strict=True)
+    matched = min_weight_full_bipartite_matching(csr_array(price - 1))  # 0 would be no edge
+    found = zip(*matched, strict=True)
     return [(int(i) + 1, int(j) + 1) for i, j in found if price[i, j] < 0]
 
 
@@ -195,8 +197,6 @@ def _places(
     features = look.texture.features
     if not features.found:
         return []
-    from scipy import ndimage
-
     at = cv2.remap(features.numbers, look.x, look.y, cv2.INTER_NEAREST) * look.seen
     y, x = np.nonzero(at)
     numbers = at[y, x]
@@ -206,10 +206,12 @@ def _places(
     index = np.flatnonzero((pixels >= FEWEST_PX) & (np.arange(len(pixels)) > 0))
     if not len(index):
         return []
-    steps = [np.gradient(look.x, axis=1), np.gradient(look.x, axis=0), np.gradient(look.y, axis=0)]
-    levels = [ndimage.median(each[y, x], numbers, index) for each in (*steps, depth)]
+    steps = [_slope(look.x, y, x, 1), _slope(look.x, y, x, 0), _slope(look.y, y, x, 0)]
+    levels = [_medians(each, numbers, pixels)[index] for each in (*steps, depth[y, x])]
     values = (x, y, *(each[y, x] for each in (look.x, look.y, counts, own)))
-    means = [ndimage.mean(each, numbers, index) for each in values]
+    means = [
+        (np.bincount(numbers, each, len(hidden)) / np.maximum(pixels, 1))[index] for each in values
+    ]
     found = []
     for place, k in enumerate(index.tolist()):
         feature = features.found[k - 1]
@@ -228,6 +230,29 @@ def _places(
         middle = np.array([u, v]) + np.linalg.solve(slopes, feature.middle - (in_x, in_y))
         found.append(_Place(Stamp(number, feature, middle, slopes, deep), k, count, share))
     return found
+
+
+def _slope(
+    picture: Float[np.ndarray, "h w"], y: Int[np.ndarray, " n"], x: Int[np.ndarray, " n"], axis: int
+) -> Float[np.ndarray, " n"]:
+    """Return `np.gradient` of a picture along an axis, at some pixels."""
+    at, last = (y, x)[axis], picture.shape[axis] - 1
+    after, before = np.minimum(at + 1, last), np.maximum(at - 1, 0)
+    ends = [(each, x) if axis == 0 else (y, each) for each in (after, before)]
+    return np.asarray((picture[ends[0]] - picture[ends[1]]) / (after - before).astype(np.float32))
+
+
+def _medians(
+    values: Float[np.ndarray, " n"], numbers: Int[np.ndarray, " n"], counts: Int[np.ndarray, " k"]
+) -> Float[np.ndarray, " k"]:
+    """Return the median of the values with each number, 0 where there are none."""
+    ordered = values[np.lexsort((values, numbers))]
+    first = np.cumsum(counts) - counts
+    low, high = (
+        ordered[(first + np.maximum(each, 0)).clip(0, len(values) - 1)]
+        for each in ((counts - 1) // 2, counts // 2)
+    )
+    return np.where(counts > 0, (low + high) / 2, 0)
 
 
 def stamped(

@@ -82,16 +82,18 @@ class Baked:
 
         def matter() -> Slices:
             density = torch.zeros(read.numel()).index_copy_(0, cells, depth).view(read.shape)
-            here = (np.pad(density, 1, mode="edge"), np.pad(hull.support, 1))
-            beyond = (np.roll(part, -1, axis=0) for part in here)
-            return Slices.of(*(part[..., None] for part in (*here, *beyond)))
+            parts = (np.pad(density, 1, mode="edge"), np.pad(hull.support, 1))
+            count = len(parts[0])
+            return Slices.of(
+                lambda x: cv2.merge([part[at % count] for at in (x, x + 1) for part in parts]),
+                count,
+            )
 
         def colors() -> Slices:
             levels = torch.full((read.numel(), 4), 255, dtype=torch.uint8)
             levels[cells, :3] = color.mul_(255).round_().byte()
-            return Slices.of(
-                np.pad(levels.view(*read.shape, 4), [(1, 1)] * 3 + [(0, 0)], mode="edge")
-            )
+            volume = np.pad(levels.view(*read.shape, 4), [(1, 1)] * 3 + [(0, 0)], mode="edge")
+            return Slices.of(lambda x: volume[x], len(volume))
 
         def labels() -> UInt8[Tensor, "red green blue"] | None:
             return None if trained.classifier is None else label_table(trained.classifier)
@@ -152,19 +154,18 @@ class Slices:
     size: tuple[int, int]
 
     @classmethod
-    def of(cls, *volumes: Shaped[np.ndarray, "x y z _"]) -> Slices:
-        """Return the slices, with the channels of all volumes, four, in about a square."""
-        x, y, z = volumes[0].shape[:3]
-        rows = min(x, max(1, round(math.sqrt(x * z / y))))
-        columns = -(-x // rows)
-        picture, first = np.zeros((rows, y, columns, z, 4), dtype=volumes[0].dtype), 0
-        for volume in volumes:
-            last = first + volume.shape[-1]
-            for column in range(columns):
-                part = volume[column * rows : (column + 1) * rows]
-                picture[: len(part), :, column, :, first:last] = part
-            first = last
-        return cls(picture.reshape(rows * y, columns * z, 4), rows, (y, z))
+    def of(
+        cls, slice_at: Callable[[int], Shaped[np.ndarray, "height width 4"]], count: int
+    ) -> Slices:
+        """Return so many slices in about a square."""
+        first = slice_at(0)
+        y, z = first.shape[:2]
+        rows = min(count, max(1, round(math.sqrt(count * z / y))))
+        picture = np.zeros((rows, y, -(-count // rows), z, 4), dtype=first.dtype)
+        for number in range(count):
+            column, row = divmod(number, rows)
+            picture[row, :, column] = slice_at(number)
+        return cls(picture.reshape(rows * y, -1, 4), rows, (y, z))
 
     def at(
         self, number: Float[Tensor, "h w"], y: Float[Tensor, "h w"], z: Float[Tensor, "h w"]

@@ -27,7 +27,7 @@ from toonset.nerf.render.labels import NONE, labels_of, palette_shares
 from toonset.nerf.render.layers import FieldView, Rendering
 from toonset.nerf.render.rays import ViewRays
 from toonset.palette.pixels.labels import UNLABELLED
-from toonset.raster import nearest
+from toonset.raster import nearest, taken
 
 SEEN_FROM = 0.5  # opacity from which a pixel has a depth and a label
 RAYS_PER_SIDE = 2  # of a pixel on a border
@@ -142,7 +142,7 @@ def enlarged(view: FieldView, small: Camera, camera: Camera, apart: float) -> Fi
     depth = np.full(alpha.shape, np.nan, np.float32)
     if seen.any():
         whole = view.depth.copy().astype(np.float32)
-        whole[part_of] = whole[part_of][nearest(seen)]
+        whole[part_of] = taken(whole[part_of], nearest(seen))
         slope, step = (warped(whole, how) for how in (cv2.INTER_LINEAR, cv2.INTER_NEAREST))
         # across a step in depth no place lies half way
         near = np.abs(slope - step) < apart

@@ -128,8 +128,9 @@ def run_page(
         "pen": drawings and drawings.pen and {"rgb": list(drawings.pen.rgb)},
         "paints": [] if drawings is None else drawings.paints.tolist(),
     }
-    poster = render(trained, cameras[ring.start]).picture(layers[0])
-    return _page(scene, ring, cameras, figure_sights(trained, cameras, ring.layered), sheet, poster)
+    start = render(trained, cameras[ring.start])
+    sights = figure_sights(trained, cameras, ring.layered, start)
+    return _page(scene, ring, cameras, sights, sheet, start.picture(layers[0]))
 
 
 def cameras_of(trained: TrainedField, ring: Ring, size: int | None = None) -> tuple[Camera, ...]:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, Int, Int16, UInt8
+from jaxtyping import Bool, Float, Int, Int8, Int16, UInt8
 
 from toonset.nerf.look.blend import DrawnView
 from toonset.palette.palette import Shadow
@@ -128,8 +128,10 @@ def _under_lines(
     """
     rgb, alpha, ink, paint = (part[box] for part in (view.rgb, view.alpha, view.ink, view.paint))
     line = np.array(pen or (0, 0, 0), np.float32) / np.float32(255)
-    made = paint * (alpha - ink)[..., None] + ink[..., None] * line
-    own = there & (_largest(made - rgb) > EXACT)
+    own = np.zeros(there.shape, dtype=bool)
+    for shown, under, over in zip(cv2.split(rgb), cv2.split(paint), line, strict=True):
+        own |= np.abs(under * (alpha - ink) + ink * over - shown) > EXACT
+    own &= there
     if not own.any():
         return paint, ink
     paint, ink, before = paint.copy(), ink.copy(), paint[own]
@@ -155,7 +157,8 @@ def _unmixed(
     known = paints.astype(np.float32)
     first, part = labels.copy(), np.zeros_like(labels)
     moved = np.zeros_like(labels)
-    rest = np.where(there[..., None], color - paints[labels].astype(np.int16), 0).astype(np.int16)
+    rest = color - paints.astype(np.int16).take(labels, axis=0)
+    rest[~there] = 0
     at = np.flatnonzero(_largest(rest) > LIKE)
     second = first.copy()
     own = color.reshape(-1, 3)[at]
@@ -169,12 +172,13 @@ def _unmixed(
     a, b, steps = np.where(less, b, a), np.where(less, a, b), np.where(less, PARTS - steps, steps)
     cover = known[a] + (steps / PARTS).astype(np.float32)[:, None] * (known[b] - known[a])
     left = own - cover
-    found = np.abs(share_moved(own, cover)[:, None] - MOVES).argmin(axis=1)
-    for whole, values in (
-        *((first, a), (second, b), (part, steps)),
-        (moved, np.where(_largest(left) > FAR, found, 0)),
+    far = np.flatnonzero(_largest(left) > FAR)
+    found = np.abs(share_moved(own[far], cover[far])[:, None] - MOVES).argmin(axis=1)
+    for whole, where, values in (
+        *((first, at, a), (second, at, b), (part, at, steps)),
+        (moved, at[far], found),
     ):
-        whole.reshape(-1)[at] = values
+        whole.reshape(-1)[where] = values
     rest.reshape(-1, 3)[at] = np.rint(left)
     kept = cv2.morphologyEx((moved > 0).astype(np.uint8), cv2.MORPH_OPEN, TWO)
     moved[kept == 0] = 0
@@ -188,23 +192,30 @@ class _Near:
     Attributes:
         own: (n,) their labels.
         common: (COMMON, n) the commonest labels around, or fewer.
-        count: (COMMON, n) how common they are, 0 where there are fewer.
+        count: (COMMON, n) pixels of each in the window.
     """
 
     own: Int[np.ndarray, " n"]
     common: Int[np.ndarray, "k n"]
-    count: Float[np.ndarray, "k n"]
+    count: Int8[np.ndarray, "k n"]
 
     @classmethod
     def of(cls, labels: Map, there: Mask, at: Int[np.ndarray, " n"]) -> _Near:
         """Return what lies around the pixels of these numbers."""
         seen = np.unique(labels[there])
-        masks = ((there & (labels == one)).astype(np.float32) for one in seen)
-        window = (AROUND, AROUND)
-        around = np.stack([cv2.boxFilter(one, -1, window).reshape(-1)[at] for one in masks])
-        order = np.argsort(-around, axis=0, kind="stable")[:COMMON]
-        count = np.take_along_axis(around, order, axis=0)
-        return cls(labels.reshape(-1)[at].astype(np.int64), seen[order].astype(np.int64), count)
+        around = np.empty((len(at), len(seen)), np.int8)
+        for number, one in enumerate(seen):
+            mask = (there & (labels == one)).view(np.uint8)
+            whole = cv2.boxFilter(mask, -1, (AROUND, AROUND), normalize=False)
+            around[:, number] = whole.take(at)
+        rows, order, count = np.arange(len(at)), [], []
+        for _ in range(min(COMMON, len(seen))):
+            most = around.argmax(axis=1)
+            order.append(most)
+            count.append(around[rows, most])
+            around[rows, most] = -1
+        common = seen[np.stack(order)].astype(np.int64)
+        return cls(labels.take(at).astype(np.int64), common, np.stack(count))
 
     def best(
         self, color: Float[np.ndarray, "n 3"], known: Float[np.ndarray, "paints 3"]
@@ -213,7 +224,7 @@ class _Near:
 
         Of one paint: the label's, or else one that the colour is like. Of two: both lie around.
         """
-        apart = np.stack([_dot(color - paint, color - paint) for paint in known], axis=1)
+        apart = np.stack([_dot(way, way) for way in (color - paint for paint in known)], axis=1)
         rows, like = np.arange(len(color)), apart.argmin(axis=1)
         least, other = apart[rows, self.own], apart[rows, like]
         strange = (least > LIKE**2) & (other <= LIKE**2)

@@ -103,20 +103,20 @@ def layered_record(view: Layered | None, shrink: int = 1) -> dict[str, Any] | No
 
 
 def picture_record(picture: Picture, shrink: int = 1) -> dict[str, Any] | None:
-    """Return a picture, cut to what it shows; None where that is nothing."""
+    """Return a picture, cut to what it shows; None where that is nothing.
+
+    Args:
+        picture: with straight alpha.
+        shrink: pixels of the view per pixel of the picture, along each axis.
+    """
     rows, columns = (np.flatnonzero(picture[..., 3].any(axis=axis)) for axis in (1, 0))
     if not len(rows):
         return None
-    top, left = (int(side[0]) // shrink * shrink for side in (rows, columns))
-    height, width = (
-        -(-(int(side[-1]) + 1 - start) // shrink) for side, start in ((rows, top), (columns, left))
+    top, left, bottom, right = (
+        int(at) for at in (rows[0], columns[0], rows[-1] + 1, columns[-1] + 1)
     )
-    part = picture[top : top + height * shrink, left : left + width * shrink]
-    room = [(0, height * shrink - part.shape[0]), (0, width * shrink - part.shape[1]), (0, 0)]
-    part = np.pad(part, room)
-    if shrink > 1:
-        part = _smaller(part, (width, height))
-    box = [left, top, width * shrink, height * shrink]
+    box = [shrink * side for side in (left, top, right - left, bottom - top)]
+    part = picture[top:bottom, left:right]
     return {"box": box, "picture": webp(part, **(SMALL if shrink > 1 else {}))}
 
 
@@ -131,11 +131,17 @@ def webp(
     return file.getvalue()
 
 
-def _smaller(picture: Picture, size_wh: tuple[int, int]) -> Picture:
-    """Return a picture in fewer pixels; transparent ones lend no colour."""
-    alpha = picture[..., 3:].astype(np.float32)
+def smaller(picture: Picture, shrink: int) -> Picture:
+    """Return a picture made `shrink` times smaller; transparent pixels lend no colour."""
+    height, width = (-(-side // shrink) for side in picture.shape[:2])
+    room = [
+        (0, shrink * size - side)
+        for size, side in zip((height, width), picture.shape, strict=False)
+    ]
+    whole = np.pad(picture, [*room, (0, 0)])
+    alpha = whole[..., 3:].astype(np.float32)
     both = cv2.resize(
-        np.dstack([picture[..., :3] * alpha, alpha]), size_wh, interpolation=cv2.INTER_AREA
+        np.dstack([whole[..., :3] * alpha, alpha]), (width, height), interpolation=cv2.INTER_AREA
     )
     both[..., :3] /= np.maximum(both[..., 3:], 1e-3)
     return np.rint(both).clip(0, 255).astype(np.uint8)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -19,7 +19,7 @@ from toonset.nerf.render.baked import Baked
 from toonset.nerf.render.layers import Rendering, default_layer
 from toonset.nerf.render.views import baked_of, render
 from toonset.nerf.viewer.layered import layered, layered_shares
-from toonset.nerf.viewer.scene import layered_record, picture_record
+from toonset.nerf.viewer.scene import layered_record, picture_record, smaller
 
 LAYERS = ("drawn", "rgb", "palette", "normal", "depth", "source")
 SHRINK = 2  # pixels of the layer that is seen at first for one of the others
@@ -39,7 +39,7 @@ def layers_of(trained: TrainedField) -> list[str]:
 
 
 def figure_sights(
-    trained: TrainedField, cameras: Sequence[Camera], layered: Sequence[bool]
+    trained: TrainedField, cameras: Sequence[Camera], layered: Sequence[bool], ready: Rendering
 ) -> list[Record]:
     """Return a record of each layer that each camera has: see `page/types.js`.
 
@@ -47,11 +47,20 @@ def figure_sights(
         trained: the figure.
         cameras: of the views.
         layered: which of them have all layers; the others have the first.
+        ready: the view of one of these cameras, which is not made again.
     """
-    layers = layers_of(trained)
-    own = [layers if all_of_them else layers[:1] for all_of_them in layered]
-    baked = baked_of(trained)
-    return side_by_side([partial(_sight, baked, *each) for each in zip(cameras, own, strict=True)])
+    layers, baked = layers_of(trained), baked_of(trained)
+    return side_by_side(
+        [
+            partial(
+                _sight,
+                baked,
+                partial(render, baked, camera) if camera is not ready.camera else lambda: ready,
+                layers if all_of_them else layers[:1],
+            )
+            for camera, all_of_them in zip(cameras, layered, strict=True)
+        ]
+    )
 
 
 def body_sights(mesh: Mesh, cameras: Sequence[Camera]) -> list[Record]:
@@ -70,26 +79,30 @@ def body_picture(mesh: Mesh, camera: Camera) -> UInt8[np.ndarray, "height width 
     return np.rint(np.dstack([straight, 255 * mean[..., 1]])).clip(0, 255).astype(np.uint8)
 
 
-def _sight(baked: Baked, camera: Camera, layers: Sequence[str]) -> Record:
-    view = render(baked, camera)
+def _sight(baked: Baked, made: Callable[[], Rendering], layers: Sequence[str]) -> Record:
+    """Return the layers of a view, the first at its size and the others SHRINK times smaller."""
+    view = made()
+    small = render(baked, view.camera.resized(1 / SHRINK))
     return {
-        layer: _layer(view, layer, 1 if number == 0 else SHRINK)
-        for number, layer in enumerate(layers)
+        layers[0]: _layer(view, layers[0]),
+        **{layer: _small_layer(view, small, layer) for layer in layers[1:]},
     }
 
 
-def _layer(view: Rendering, layer: str, shrink: int) -> Record | None:
+def _layer(view: Rendering, layer: str) -> Record | None:
     drawings = view.field.drawings
-    if layer == "drawn" and drawings is not None:
-        pen = None if drawings.pen is None else drawings.pen.rgb
-        return layered_record(layered(view.drawn, drawings.paints, pen, drawings.drawn_shadow))
-    if layer == "palette" and view.shares is not None:
-        parts = np.dstack([view.shares, view.alpha])
-        height, width = (side // shrink for side in view.alpha.shape)
-        blocks = parts[: height * shrink, : width * shrink]
-        mean = cv2.resize(blocks, (width, height), interpolation=cv2.INTER_AREA)
-        return layered_record(layered_shares(mean[..., :-1], mean[..., -1]), shrink)
-    return picture_record(view.picture(layer), shrink)
+    if layer != "drawn" or drawings is None:
+        return picture_record(view.picture(layer))
+    pen = None if drawings.pen is None else drawings.pen.rgb
+    return layered_record(layered(view.drawn, drawings.paints, pen, drawings.drawn_shadow))
+
+
+def _small_layer(view: Rendering, small: Rendering, layer: str) -> Record | None:
+    """Return a layer of a small view; where paint comes from is told by the view itself."""
+    if layer == "palette" and small.shares is not None:
+        return layered_record(layered_shares(small.shares, small.alpha), SHRINK)
+    own = smaller(view.picture(layer), SHRINK) if layer == "source" else small.picture(layer)
+    return picture_record(own, SHRINK)
 
 
 def _body_sight(mesh: Mesh, camera: Camera) -> Record:

@@ -34,6 +34,21 @@ def test_project_inverts_unproject(yaw, elevation, roll, k, aspect):
     np.testing.assert_allclose(again_depth, depth, atol=1e-9)
 
 
+@settings(max_examples=20, deadline=None)
+@given(yaw=ANGLE, elevation=ELEVATION, k=K, aspect=st.sampled_from([1.0, 0.8]))
+def test_whole_pictures_are_projected_as_single_points_are(yaw, elevation, k, aspect):
+    camera, other = make(yaw, elevation, 0.1, k, aspect), make(yaw + 2.5, 0.2, 0.0, 0.3, aspect)
+    depth = np.random.default_rng(0).uniform(-1.5, 4.5, camera.size_wh[::-1])
+    points = camera.unproject(camera.pixel_grid(), depth)
+    np.testing.assert_allclose(camera.unproject_grid(depth), points, atol=1e-9)
+    for one in (camera, other):  # of the other some lie behind
+        pixels, own_depth, front = one.project(points)
+        found, its_depth, its_front = one.project_grid(points)
+        np.testing.assert_array_equal(its_front, front)
+        np.testing.assert_allclose(np.moveaxis(found, 0, -1), pixels, rtol=1e-6, atol=1e-6)
+        np.testing.assert_allclose(its_depth, own_depth, atol=1e-9)
+
+
 @settings(max_examples=40, deadline=None)
 @given(yaw=ANGLE, elevation=ELEVATION, roll=st.floats(-1.5, 1.5))
 def test_angles_invert_rotation(yaw, elevation, roll):

@@ -9,9 +9,11 @@ from toonset.raster import (
     depth_inside,
     depth_near_edge,
     from_nearest,
+    in_rows,
     median_inside,
     nearest,
     sized_parts,
+    taken,
 )
 
 
@@ -64,3 +66,17 @@ def test_what_is_connected_to_a_seed_reaches_it_by_sides_not_by_corners() -> Non
     seeds[2, 3] = seeds[1, 0] = True  # the second one is not free
     found = connected_to(seeds, free)
     assert found.tolist() == [[False] * 4, [False, False, True, False], [False, False, True, True]]
+
+
+def test_pixels_in_rows_are_all_of_them_and_the_last_again() -> None:
+    assert in_rows(np.arange(0)).size == 0
+    rows = in_rows(np.arange(100))
+    assert rows.reshape(-1)[:100].tolist() == list(range(100))
+    assert set(rows.reshape(-1)[100:].tolist()) == {99}
+
+
+def test_taken_is_what_rows_and_columns_index() -> None:
+    rng = np.random.default_rng(0)
+    at = (rng.integers(0, 7, (7, 5)), rng.integers(0, 5, (7, 5)))
+    for picture in (rng.random((7, 5)), rng.random((7, 5, 3))):
+        np.testing.assert_array_equal(taken(picture, at), picture[at])

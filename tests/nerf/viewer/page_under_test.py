@@ -22,6 +22,7 @@ from toonset.nerf.viewer.scene import (
     coding,
     layered_record,
     picture_record,
+    smaller,
     webp,
 )
 
@@ -64,7 +65,7 @@ def _sight(yaw: float, elevation: float, level: int, whole: bool) -> dict[str, A
     for i, layer in enumerate(("rgb", "normal", "depth", "source") if whole else ()):
         grey = np.full((SIDE, SIDE, 1), 40 * i, np.uint8)
         opaque = 255 * (view.alpha > 0.5).astype(np.uint8)
-        layers[layer] = picture_record(np.dstack([grey, grey, grey, opaque]), 2)
+        layers[layer] = picture_record(smaller(np.dstack([grey, grey, grey, opaque]), 2), 2)
     angles = [math.radians(yaw), math.radians(elevation), 0.0]
     return {"angles": angles, "level": level, "layers": layers}
 

@@ -25,6 +25,7 @@ from toonset.nerf.train.labelling import label_scene
 from toonset.nerf.training import train
 from toonset.nerf.viewer.build import SheetDrawings, cameras_of, run_page
 from toonset.nerf.viewer.ring import Ring, ring_through
+from toonset.nerf.viewer.scene import smaller
 from toonset.nerf.viewer.sights import SHRINK
 from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.names import hex_of
@@ -91,22 +92,18 @@ def test_a_layer_is_what_render_draws(pages: dict[str, Shown], name: str, layer:
     one = pages[name]
     for i, camera in enumerate(one.cameras):
         if layer == "drawn" or one.ring.layered[i]:
-            wanted = at_its_size(layer, render(one.trained, camera).picture(layer))
+            wanted = at_its_size(layer, one.trained, camera)
             found = psnr(shown(one.page, i, layer, side=len(wanted)), wanted)
             assert found >= LEAST_DB[layer], (i, found)
 
 
-def at_its_size(layer: str, picture: UInt8[np.ndarray, "h w 4"]) -> UInt8[np.ndarray, "h w 4"]:
-    """Return a picture at the size that the page keeps a layer at: half, but for the first."""
+def at_its_size(layer: str, trained: TrainedField, camera: Camera) -> UInt8[np.ndarray, "h w 4"]:
+    """Return a layer as `render` draws it at the size that the page has it at: half, or all."""
     if layer == "drawn":
-        return picture
-    rows, columns = (side // SHRINK * SHRINK for side in picture.shape[:2])
-    straight = picture[:rows, :columns].astype(float)
-    cover = straight[..., 3:] / 255
-    whole = np.dstack([straight[..., :3] * cover, cover])
-    mean = whole.reshape(rows // SHRINK, SHRINK, columns // SHRINK, SHRINK, 4).mean(axis=(1, 3))
-    color = mean[..., :3] / np.maximum(mean[..., 3:], 1e-9)
-    return np.rint(np.dstack([color, 255 * mean[..., 3:]])).astype(np.uint8)
+        return render(trained, camera).picture(layer)
+    if layer == "source":
+        return smaller(render(trained, camera).picture(layer), SHRINK)
+    return render(trained, camera.resized(1 / SHRINK)).picture(layer)
 
 
 @pytest.mark.parametrize("name", ["field", "body"])
@@ -142,11 +139,18 @@ def test_another_colour_changes_only_that_paint(pages: dict[str, Shown], layer: 
     i = int(np.flatnonzero(one.ring.layered)[1])
     after, before = (shown(one.page, i, layer, **more) for more in ({"colors": colors}, {}))
     moved = np.abs(over_white(after) - over_white(before)).max(axis=-1) > 2 / 255
-    view = render(one.trained, one.cameras[i])
-    assert view.labels is not None
-    own = view.labels == 0 if layer == "palette" else view.drawn.palette_labels(len(colors)) == 0
+    if layer == "palette":
+        labels = render(one.trained, one.cameras[i].resized(1 / SHRINK)).labels
+        assert labels is not None
+        own, near = (
+            np.kron(part, np.ones((SHRINK, SHRINK), bool))
+            for part in (labels == 0, dilate(labels == 0, 3))
+        )
+    else:
+        own = render(one.trained, one.cameras[i]).drawn.palette_labels(len(colors)) == 0
+        near = dilate(own, 3)
     assert moved[own].mean() > 0.9
-    assert not moved[~dilate(own, 3)].any()
+    assert not moved[~near].any()
 
 
 def test_lines_are_switched_off(pages: dict[str, Shown]) -> None:
