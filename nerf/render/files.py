@@ -11,7 +11,7 @@ from toonset.dataset.images.picture import encode_png
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.render.animation import Pictures, encode_gif, encode_mp4, encode_webp, smaller
 from toonset.nerf.render.baked import Baked
-from toonset.nerf.render.depth_levels import DepthLevels
+from toonset.nerf.render.depth import DepthLevels
 from toonset.nerf.render.open_raster import PaintLayer, check_layered, encode_ora, layered
 from toonset.nerf.render.sprite_sheet import feet, sprite_json, sprite_sheet
 from toonset.nerf.render.views import render
