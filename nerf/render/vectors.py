@@ -86,15 +86,22 @@ class Vectors:
     regions: tuple[Region, ...]
 
 
-def trace(view: DrawnView, pen: Outline | None) -> Vectors:
+def trace(
+    view: DrawnView,
+    paints: UInt8[np.ndarray, "paints 3"],
+    pen: Outline | None,
+    enlarged: float = 1.0,
+) -> Vectors:
     """Return a view as regions; none where nothing is seen.
 
     Args:
         view: in the drawn look.
+        paints: colours of its labels.
         pen: that drew its lines, `width_px` in the view's pixels; None: there are none.
+        enlarged: the view's pixels in one of the drawings: an enlarged one is traced smaller.
     """
     height, width = view.alpha.shape
-    by = min(1.0, MOST_PX / max(height, width))
+    by = min(1.0, 1 / enlarged, MOST_PX / max(height, width))
     if by < 1:
         view = _resized(view, by)
         pen = pen and replace(pen, width_px=pen.width_px * by)
@@ -105,11 +112,11 @@ def trace(view: DrawnView, pen: Outline | None) -> Vectors:
     picture = _Picture.of(view, pen)
     colors, shares = _explained(picture)
     shares = _without_crumbs(shares, colors, picture.color)
-    paints = [_paint_of(shares.labels == k, view.labels) for k in range(len(colors))]
+    of_colors = _paints_of(colors, paints, shares.labels, view.labels)
     shares = _with_borders(shares, colors, picture)
-    colors, paints, shares = _with_lines(colors, paints, shares, picture, pen)
+    colors, of_colors, shares = _with_lines(colors, of_colors, shares, picture, pen)
     corner = np.array([box[1].start, box[0].start])
-    stack = _Stack(colors, tuple(paints), shares, shares.labels)
+    stack = _Stack(colors, tuple(of_colors), shares, shares.labels)
     return Vectors((width, height), stack.regions(corner, by))
 
 
@@ -399,9 +406,20 @@ def _with_borders(shares: _Shares, colors: Colors, picture: _Picture) -> _Shares
     return replace(shares, clear=np.where(picture.cover > 1 - MIXED, smooth, 1))
 
 
-def _paint_of(mask: Mask, labels: UInt8[np.ndarray, "height width"]) -> int:
-    """Return the paint that most of a colour's pixels have."""
-    return int(np.bincount(labels[mask], minlength=1).argmax())
+def _paints_of(
+    colors: Colors,
+    paints: UInt8[np.ndarray, "paints 3"],
+    own: Labels,
+    labels: UInt8[np.ndarray, "height width"],
+) -> list[int]:
+    """Return the paint of every colour: the one that it is, else that most of its pixels have."""
+    found = []
+    for k, color in enumerate(colors):
+        away = np.linalg.norm(paints / 255.0 - color, axis=1)
+        same = away.min(initial=np.inf) < NEAR
+        most = np.bincount(labels[own == k], minlength=1)
+        found.append(int(away.argmin() if same else most.argmax()))
+    return found
 
 
 def _with_lines(
@@ -492,7 +510,9 @@ class _Stack:
         field[[0, -1]] = field[:, [0, -1]] = 0  # a figure that is cut off ends there
         soft = cv2.GaussianBlur(field, (0, 0), 1.0)
         field = soft + clear * (1 + CRISPER) * (field - soft)
-        finer = cv2.resize(field.astype(np.float32), None, fx=2, fy=2, interpolation=cv2.INTER_CUBIC)
+        finer = cv2.resize(
+            field.astype(np.float32), None, fx=2, fy=2, interpolation=cv2.INTER_CUBIC
+        )
         found = [(points[:-1, ::-1] + 0.5) / 2 - 2 + (x, y) for points in find_contours(finer, 0.5)]
         return [points for points in found if len(points) > 2 and abs(_area(points)) > LEAST_PX]
 
