@@ -116,7 +116,9 @@ def trace(
     shares = _with_borders(shares, colors, picture)
     colors, of_colors, shares = _with_lines(colors, of_colors, shares, picture, pen)
     corner = np.array([box[1].start, box[0].start])
-    stack = _Stack(colors, tuple(of_colors), shares, shares.labels)
+    outline = (shares.ink > shares.cover) & (shares.labels != NONE)
+    labels = np.where(outline, len(colors) - 1, shares.labels)
+    stack = _Stack(colors, tuple(of_colors), shares, labels)
     return Vectors((width, height), stack.regions(corner, by))
 
 
@@ -175,7 +177,8 @@ class _Picture:
             rim |= distance_to(view.alpha < SOLID) < pen.width_px + 1.5
             under = view.rgb - view.ink[..., None] * known[0]
             off = np.abs(under - (view.alpha - view.ink)[..., None] * view.paint).max(axis=-1)
-            if (off[view.ink > 0] < MIXED).mean() > 1 - MIXED:  # the outline was drawn anew
+            wrong = np.count_nonzero(off[view.ink > 0] > MIXED)
+            if wrong < MIXED * np.count_nonzero(view.ink):  # the outline was drawn anew
                 ink, rgb = view.ink, under
         cover = view.alpha - ink
         color = rgb / np.maximum(cover, 1e-6)[..., None]
@@ -248,28 +251,32 @@ class _Shares:
 def _explained(picture: _Picture) -> tuple[Colors, _Shares]:
     """Return a picture's colours, and every pixel's shares of them."""
     color, inner = picture.color, picture.pure & ~picture.rim
-    colors = _common(color[inner & (picture.contrast < STEP)], picture.known)
+    flat = color[inner & (picture.contrast < STEP)]
+    colors = _common(flat, np.ones(len(flat)), RARE, picture.known)
     if len(colors) == len(picture.known):  # nothing is flat
         mean = color[picture.cover >= min(SOLID, float(picture.cover.max()))].mean(axis=0)
         colors = np.concatenate([colors, mean[None]])
     shares, off = _shares(picture, colors)
-    more = _common(color[(off > UNEXPLAINED) & inner], colors)
+    left = (off > UNEXPLAINED) & inner
+    more = _common(color[left], off[left], CRUMB, colors)
     return (more, _shares(picture, more)[0]) if len(more) > len(colors) else (colors, shares)
 
 
-def _common(pixels: Float[np.ndarray, "n 3"], known: Colors) -> Colors:
-    """Return known colours, then the commonest one that is near to none of them, and so on."""
+def _common(
+    pixels: Float[np.ndarray, "n 3"], weights: Float[np.ndarray, " n"], least: float, known: Colors
+) -> Colors:
+    """Return known colours, then the weightiest one that is near to none of them, and so on."""
     level = np.rint(pixels * 31).astype(np.int64) @ np.array([1024, 32, 1])
-    kinds, where, counts = np.unique(level, return_inverse=True, return_counts=True)
-    sums = np.stack([np.bincount(where, pixels[:, c], len(kinds)) for c in range(3)], axis=1)
-    means = sums / counts[:, None]
-    left = counts.astype(np.float64)
+    kinds, where = np.unique(level, return_inverse=True)
+    left = np.bincount(where, weights, len(kinds))
+    sums = [np.bincount(where, weights * pixels[:, c], len(kinds)) for c in range(3)]
+    means = np.stack(sums, axis=1) / left[:, None]
     for one in known:
         left[np.linalg.norm(means - one, axis=1) < NEAR] = 0
     found = list(known)
     while len(found) < COLORS and left.max(initial=0) > 0:
         away = np.linalg.norm(means - means[left.argmax()], axis=1)
-        if left[away < NEAR].sum() >= RARE:
+        if left[away < NEAR].sum() >= least:
             core = (away < NEAR / 2) & (left > 0)
             found.append(np.average(means[core], axis=0, weights=left[core]))
         left[away < NEAR] = 0
@@ -438,17 +445,15 @@ def _with_lines(
     drawn = inky[shares.labels] & (shares.labels != NONE)
     thick = drawn & (distance_to(~drawn) > 0.9 * pen.width_px + 0.5)
     line = drawn & (distance_to(thick) > 1.9 * pen.width_px if thick.any() else True)
-    outline = (shares.ink > shares.cover) & (shares.ink + shares.cover >= SOLID)
     first, second = (
-        np.where(outline | (dilate(line) & inky[one]), lines, one)
-        for one in (shares.first, shares.second)
+        np.where(dilate(line) & inky[one], lines, one) for one in (shares.first, shares.second)
     )
     return *every, replace(shares, first=first, second=second)
 
 
 @dataclass(frozen=True, eq=False)
 class _Stack:
-    """Colours that are to lie on each other; `labels` are those of the shares."""
+    """Colours that are to lie on each other; `labels` are those of the shares, and of the ink."""
 
     colors: Colors
     paints: tuple[int, ...]
@@ -506,8 +511,7 @@ class _Stack:
         reach = np.maximum(reach, dilate(filled[parts]))
         reach = np.minimum(reach, np.clip(distance_to(outside) - 1, 0, 1))
         field = self.shares.of(own, at) + reach * self.shares.of(above, at)
-        field, clear = (np.pad(one, 2, mode="edge") for one in (field, self.shares.clear[at]))
-        field[[0, -1]] = field[:, [0, -1]] = 0  # a figure that is cut off ends there
+        field, clear = np.pad(field, 2), np.pad(self.shares.clear[at], 2, mode="edge")
         soft = cv2.GaussianBlur(field, (0, 0), 1.0)
         field = soft + clear * (1 + CRISPER) * (field - soft)
         finer = cv2.resize(
