@@ -13,12 +13,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 SPACING_PX = 0.75  # of a contour's points
 REACH = 3  # points to either side that a tangent is measured over
 CORNER = np.cos(np.deg2rad(50))  # of the angle that a contour turns by at a corner, or more
 ROUNDS = 2  # of moving every point's parameter to the nearest place of the curve
+SMOOTHING = 3 * (0.5, -0.53)  # share of the way to the middle of the neighbours, and back
 TINY = 1e-9
 
 Points = Float[np.ndarray, "n 2"]
@@ -93,6 +94,9 @@ def _measured(points: Points) -> tuple[_Contours, Int[np.ndarray, " knots"]]:
     turn = (into * out).sum(axis=1)
     around = np.stack([np.roll(turn, by) for by in range(-reach, reach + 1)])
     corner = (turn < CORNER) & (turn <= around.min(axis=0))
+    points = _smoothed(points, corner)
+    before, after = (np.roll(points, by, axis=0) for by in (reach, -reach))
+    into, out, through = (_unit(way) for way in (points - before, after - points, after - before))
     found = np.flatnonzero(corner)
     if len(found) < 2:
         first = int(found[0]) if len(found) else 0
@@ -105,6 +109,14 @@ def _measured(points: Points) -> tuple[_Contours, Int[np.ndarray, " knots"]]:
     along = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(at, axis=0), axis=1))])
     knots = np.append(np.sort(found) - found.min(), len(points))
     return _Contours(at, ahead, behind, along), knots
+
+
+def _smoothed(points: Points, corner: Bool[np.ndarray, " n"]) -> Points:
+    """Return a contour without the steps of pixels; corners stay, and it does not shrink."""
+    for by in SMOOTHING:
+        middle = (np.roll(points, 1, axis=0) + np.roll(points, -1, axis=0)) / 2
+        points = np.where(corner[:, None], points, points + by * (middle - points))
+    return points
 
 
 def _fitted(

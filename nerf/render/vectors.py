@@ -28,10 +28,10 @@ from skimage.measure import find_contours, label
 from toonset.nerf.look.blend import SOLID, DrawnView
 from toonset.nerf.look.outline import Outline
 from toonset.nerf.render.bezier import Curve, Points, fit_closed
-from toonset.raster import dilate, distance_to, from_nearest, is_uniform
+from toonset.raster import connected_to, dilate, distance_to, from_nearest, is_uniform, sized_parts
 
 LINES = -1  # the paint of lines
-OFF_PX = 0.25  # how far a curve may be off the border that it follows
+OFF_PX = 0.2  # how far a curve may be off the border that it follows
 MOST_PX = 1600  # longest side: larger views are traced smaller
 NEAR = 0.06  # of colours (Euclidean, channels in [0, 1]): nearer ones count as one
 STEP = 0.12  # of colours: less between neighbours is no edge
@@ -118,7 +118,9 @@ def trace(
     corner = np.array([box[1].start, box[0].start])
     outline = (shares.ink > shares.cover) & (shares.labels != NONE)
     labels = np.where(outline, len(colors) - 1, shares.labels)
-    stack = _Stack(colors, tuple(of_colors), shares, labels)
+    like_pen = (np.linalg.norm(colors - colors[-1], axis=1) < NEAR) & (pen is not None)
+    like_pen[-1] = False
+    stack = _Stack(colors, tuple(of_colors), like_pen, shares, labels)
     return Vectors((width, height), stack.regions(corner, by))
 
 
@@ -445,6 +447,9 @@ def _with_lines(
     drawn = inky[shares.labels] & (shares.labels != NONE)
     thick = drawn & (distance_to(~drawn) > 0.9 * pen.width_px + 0.5)
     line = drawn & (distance_to(thick) > 1.9 * pen.width_px if thick.any() else True)
+    numbers, areas = sized_parts(line)
+    body = connected_to(thick, drawn)  # ends of it are no lines
+    line &= ~body | (areas >= (3 * pen.width_px) ** 2)[numbers]
     first, second = (
         np.where(dilate(line) & inky[one], lines, one) for one in (shares.first, shares.second)
     )
@@ -453,10 +458,18 @@ def _with_lines(
 
 @dataclass(frozen=True, eq=False)
 class _Stack:
-    """Colours that are to lie on each other; `labels` are those of the shares, and of the ink."""
+    """Colours that are to lie on each other.
+
+    Attributes:
+        colors, paints: of the shares, lines last.
+        like_pen: colours that lines go on over, for nobody sees where they end there.
+        shares: of every pixel.
+        labels: those of the shares, lines where the outline is.
+    """
 
     colors: Colors
     paints: tuple[int, ...]
+    like_pen: Bool[np.ndarray, " colors"]
     shares: _Shares
     labels: Labels
 
@@ -485,7 +498,8 @@ class _Stack:
         order = self.order()
         for k in order:
             above[k] = False
-            borders[k] = [points + corner for points in self._borders(k, above)]
+            under = self.like_pen if self.paints[k] == LINES else above
+            borders[k] = [points + corner for points in self._borders(k, under)]
         curves = iter(fit_closed(list(itertools.chain.from_iterable(borders.values())), OFF_PX))
         found = []
         for k in order:
@@ -497,14 +511,14 @@ class _Stack:
         return tuple(found)
 
     def _borders(self, k: int, above: Bool[np.ndarray, " colors"]) -> list[Points]:
-        """Return the contours of a colour and of what it goes on under."""
+        """Return the contours of a colour and of what it goes on under; lines go on above."""
         x, y, width, height = cv2.boundingRect((self.labels == k).view(np.uint8))
         x, y = max(0, x - 3), max(0, y - 3)
         at = (slice(y, y + height + 6), slice(x, x + width + 6))
         labels, own = self.labels[at], np.arange(len(self.colors)) == k
         mask, outside = labels == k, labels == NONE
         parts, count = label(~mask, background=0, connectivity=1, return_num=True)
-        lower = ~(above[labels] & ~outside)
+        lower = ~(above[labels] & ~outside) | (self.paints[k] == LINES)
         filled = np.bincount(parts.ravel(), lower.ravel(), count + 1) == 0
         filled[[0, *parts[[0, -1]].ravel(), *parts[:, [0, -1]].ravel()]] = False
         reach = np.clip(BENEATH_PX + 1 - distance_to(mask), 0, 1)
