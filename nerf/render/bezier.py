@@ -3,8 +3,10 @@
 A segment between two knots of a contour is the least-squares cubic with the contour's own tangents
 at its ends; one that lies farther off than the tolerance is divided where it is farthest off. Knots
 are the corners first. All segments of a round are fitted together, as sums over their points.
+Before, a contour is smoothed without shrinking: steps of pixels are no shape.
 
-Source: Schneider, "An Algorithm for Automatically Fitting Digitized Curves", Graphics Gems, 1990.
+Sources: Schneider, "An Algorithm for Automatically Fitting Digitized Curves", Graphics Gems, 1990;
+Taubin, "Curve and surface smoothing without shrinkage", 1995.
 """
 
 from __future__ import annotations

@@ -174,7 +174,7 @@ class _Picture:
         ink, rgb, rim = np.zeros_like(view.alpha), view.rgb, dilate(view.ink > 0)
         known, around_px = np.zeros((0, 3), np.float32), AROUND_PX
         if pen is not None:
-            known = np.float32([pen.rgb]) / 255
+            known = np.array([pen.rgb], np.float32) / 255
             around_px = max(AROUND_PX, 2 * round(pen.width_px) + 5)
             rim |= distance_to(view.alpha < SOLID) < pen.width_px + 1.5
             under = view.rgb - view.ink[..., None] * known[0]

@@ -221,13 +221,13 @@ def test_svg_names_groups_and_holds_every_colour_in_one_class() -> None:
     names = ["red & <hot>", 'skin "light"', "teal", "3rd"]
     data = encode_svg(trace(view_of(figure()), PAINTS, None), names, "a < b")
     root = ET.fromstring(data)
-    assert root.find(f"{SVG}title").text == "a < b"  # type: ignore[union-attr]
+    assert root.findtext(f"{SVG}title") == "a < b"
     groups = root.findall(f"{SVG}g")
     assert {group.get(f"{INKSCAPE}label") for group in groups} == set(names)
     idents = [group.get("id") for group in groups]
     assert len(set(idents)) == len(idents)
     assert "paint-3rd" in idents
-    styles = root.find(f"{SVG}style").text  # type: ignore[union-attr]
+    styles = root.findtext(f"{SVG}style", "")
     for part in root.iter(f"{SVG}g"):
         if part.get("class"):
             assert styles.count(f".{part.get('class')}{{fill:{part.get('fill')}}}") == 1
