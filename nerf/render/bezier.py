@@ -152,10 +152,10 @@ def _fit_round(
     t = (contours.along[index] - contours.along[first][segment]) / whole[segment]
     ends = contours.at[first], contours.at[last]
     tangents = contours.ahead[first], -contours.behind[last]
-    for number in range(ROUNDS + 1):
+    cubic = _least_squares(at, t, segment, ends, tangents, whole)
+    for _ in range(ROUNDS):
+        t = _nearer(cubic[segment], at, t)
         cubic = _least_squares(at, t, segment, ends, tangents, whole)
-        if number < ROUNDS:
-            t = _nearer(cubic[segment], at, t)
     off = np.square(_points(cubic[segment], t) - at).sum(axis=1)
     worst = np.maximum.reduceat(off, begins)
     is_worst = np.flatnonzero(off >= worst[segment])
@@ -218,9 +218,7 @@ def _nearer(
 
 
 def _points(cubic: Float[np.ndarray, "n 4 2"], t: Float[np.ndarray, " n"]) -> Points:
-    basis = _bernstein(t)
-    found: Points = sum(basis[k][:, None] * cubic[:, k] for k in range(4))
-    return found
+    return np.asarray(np.einsum("kn,nkc->nc", _bernstein(t), cubic))
 
 
 def _bernstein(t: Float[np.ndarray, " n"]) -> Float[np.ndarray, "4 n"]:

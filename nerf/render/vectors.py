@@ -28,7 +28,15 @@ from skimage.measure import find_contours, label
 from toonset.nerf.look.blend import SOLID, DrawnView
 from toonset.nerf.look.outline import Outline
 from toonset.nerf.render.bezier import Curve, Points, fit_closed
-from toonset.raster import connected_to, dilate, distance_to, from_nearest, is_uniform, sized_parts
+from toonset.raster import (
+    connected_to,
+    dilate,
+    distance_to,
+    from_nearest,
+    is_uniform,
+    parts,
+    sized_parts,
+)
 
 LINES = -1  # the paint of lines
 OFF_PX = 0.2  # how far a curve may be off the border that it follows
@@ -172,7 +180,8 @@ class _Picture:
     def of(cls, view: DrawnView, pen: Outline | None) -> _Picture:
         """Return the picture of a view; a drawing's own outline is taken for paint."""
         ink, rgb, rim = np.zeros_like(view.alpha), view.rgb, dilate(view.ink > 0)
-        known, around_px = np.zeros((0, 3), np.float32), AROUND_PX
+        known: Colors = np.zeros((0, 3), np.float32)
+        around_px = AROUND_PX
         if pen is not None:
             known = np.array([pen.rgb], np.float32) / 255
             around_px = max(AROUND_PX, 2 * round(pen.width_px) + 5)
@@ -356,7 +365,8 @@ def _without_crumbs(shares: _Shares, colors: Colors, color: Color) -> _Shares:
     """Return shares without parts that might as well have the colour of a larger part beside."""
     for _ in range(ROUNDS):
         labels = shares.labels
-        numbers, count = label(labels, background=NONE, connectivity=1, return_num=True)
+        numbers: Labels = np.asarray(label(labels, background=NONE, connectivity=1))
+        count = int(numbers.max())
         beside = _beside(numbers, count, labels, colors, color)
         there = beside[numbers] != NONE
         own, other = colors[labels[there]], colors[beside[numbers[there]]]
@@ -517,12 +527,12 @@ class _Stack:
         at = (slice(y, y + height + 6), slice(x, x + width + 6))
         labels, own = self.labels[at], np.arange(len(self.colors)) == k
         mask, outside = labels == k, labels == NONE
-        parts, count = label(~mask, background=0, connectivity=1, return_num=True)
+        holes = parts(~mask, connectivity=4)
         lower = ~(above[labels] & ~outside) | (self.paints[k] == LINES)
-        filled = np.bincount(parts.ravel(), lower.ravel(), count + 1) == 0
-        filled[[0, *parts[[0, -1]].ravel(), *parts[:, [0, -1]].ravel()]] = False
+        filled = np.bincount(holes.ravel(), lower.ravel()) == 0
+        filled[[0, *holes[[0, -1]].ravel(), *holes[:, [0, -1]].ravel()]] = False
         reach = np.clip(BENEATH_PX + 1 - distance_to(mask), 0, 1)
-        reach = np.maximum(reach, dilate(filled[parts]))
+        reach = np.maximum(reach, dilate(filled[holes]))
         reach = np.minimum(reach, np.clip(distance_to(outside) - 1, 0, 1))
         field = self.shares.of(own, at) + reach * self.shares.of(above, at)
         field, clear = np.pad(field, 2), np.pad(self.shares.clear[at], 2, mode="edge")
@@ -538,20 +548,20 @@ class _Stack:
 def _shapes(contours: Sequence[Points], curves: Sequence[Curve]) -> tuple[Shape, ...]:
     """Return outlines, each with its holes: those that lie in it and in no smaller one."""
     areas = [_area(points) for points in contours]
-    parts = {i: [i] for i, area in enumerate(areas) if area > 0}
+    shapes = {i: [i] for i, area in enumerate(areas) if area > 0}
     for i, area in enumerate(areas):
         if area > 0:
             continue
         x, y = contours[i][0].tolist()
         around = [
             j
-            for j in parts
+            for j in shapes
             if areas[j] > -area
             and cv2.pointPolygonTest(contours[j].astype(np.float32), (x, y), measureDist=False) >= 0
         ]
         if around:
-            parts[min(around, key=areas.__getitem__)].append(i)
-    return tuple(tuple(curves[i] for i in part) for part in parts.values())
+            shapes[min(around, key=areas.__getitem__)].append(i)
+    return tuple(tuple(curves[i] for i in part) for part in shapes.values())
 
 
 def _area(points: Points) -> float:
