@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     Named = list[tuple[str, Camera]]
 
 DEPTH_FILE = "depth.json"
-WRITTEN = ("*.png", "turntable.*", "sprites.json", DEPTH_FILE)
+WRITTEN = ("*.png", "*.svg", "turntable.*", "sprites.json", DEPTH_FILE)
 
 
 def _like(incomplete: str) -> list[str]:
@@ -92,7 +92,7 @@ def render(
         typer.Option(
             "--format",
             metavar=f"<{'|'.join(FORMATS)}>,...",
-            help="Of all views together.",
+            help="Of all views together; svg: one per view.",
             autocompletion=_like,
         ),
     ] = None,
@@ -107,14 +107,15 @@ def render(
     as_json: JsonFlag = False,
     quiet: QuietFlag = False,
 ) -> None:
-    """Render a trained run: one PNG per camera and layer, and files of a whole turntable.
+    """Render a trained run: one PNG per camera and layer, SVG, and files of a whole turntable.
 
     A turntable passes through the drawings, at their elevation and size, unless --elevation or
     --size say otherwise; its GIF and WebP are 1024 px at most without --size. `drawn`, the default,
     puts views together from the drawings and draws their outline anew. `rgb` is the field's own
     colour; `palette` shows palette colours only; `normal` codes x, y, z of the world as red, green,
     blue, `normal-camera` right, up and towards the viewer; `depth` has 16 bits, which depth.json
-    turns into world units. Several layers are written as NAME-LAYER.png.
+    turns into world units. Several layers are written as NAME-LAYER.png. `--format svg` writes each
+    view of `drawn` as smooth paths, too: a group per paint, and lines.
     """
     printer = Printer(as_json, quiet)
     repaint = bool(recolor or palette)
@@ -159,13 +160,20 @@ def render(
 def _report(
     out: Path, layers: list[str], sizes: dict[str, int], views: int, printer: Printer
 ) -> None:
-    """Print what was written: a picture per view and layer, and files of all views."""
+    """Print what was written: pictures per view and layer, SVGs, and files of all views."""
     names = [name for name in sizes if name != DEPTH_FILE]
-    files, together = names[: views * len(layers)], names[views * len(layers) :]
-    extra = "".join(f", {name} ({math.ceil(sizes[name] / 1000)} kB)" for name in together)
+    files, others = names[: views * len(layers)], names[views * len(layers) :]
+    traced = [name for name in others if name.endswith(".svg")]
+    together = [name for name in others if name not in traced]
+    extra = [f"{name} ({math.ceil(sizes[name] / 1000)} kB)" for name in together]
+    if traced:
+        extra.insert(
+            0, f"{len(traced)} SVG ({math.ceil(sum(sizes[name] for name in traced) / 1000)} kB)"
+        )
     shown = f"{len(files)} {'picture' if len(files) == 1 else 'pictures'} ({', '.join(layers)})"
-    values = {"out": out, "layer": layers[0], "layers": layers, "files": files}
-    printer.result({**values, "together": together}, f"{out}: {shown}{extra}")
+    values = {"out": out, "layer": layers[0], "layers": layers, "files": files, "svg": traced}
+    said = ", ".join([f"{out}: {shown}", *extra])
+    printer.result({**values, "together": together}, said)
 
 
 def _formats(given: str | None, gif: bool | None, *, turning: bool) -> tuple[str, ...]:

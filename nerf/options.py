@@ -32,7 +32,8 @@ DeviceName = Literal["auto", "cpu", "cuda"]
 DEVICES: tuple[DeviceName, ...] = get_args(DeviceName)
 PresetName = Literal["fast", "paper"]
 PRESETS: tuple[PresetName, ...] = get_args(PresetName)
-FORMATS = ("gif", "webp", "mp4", "sprites", "ora")  # of all views of a turn together
+# Of all views of a turn together; "svg": a file per view
+FORMATS = ("gif", "webp", "mp4", "sprites", "ora", "svg")
 LEAST = {"steps": 1, "budget_s": 0, "seed": 0, "resolution": 2, "missing_views": 0}
 LEAST |= {"smoothness": 0, "palette_weight": 0}
 MOST_STEPS = 10_000_000  # days

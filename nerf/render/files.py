@@ -11,14 +11,15 @@ from toonset.dataset.images.picture import encode_png
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.render.animation import Pictures, encode_gif, encode_mp4, encode_webp, smaller
 from toonset.nerf.render.baked import Baked
-from toonset.nerf.render.depth_levels import DepthLevels
+from toonset.nerf.render.depth import DepthLevels
 from toonset.nerf.render.open_raster import PaintLayer, check_layered, encode_ora, layered
 from toonset.nerf.render.sprite_sheet import feet, sprite_json, sprite_sheet
+from toonset.nerf.render.svg import check_traced, svg_of
 from toonset.nerf.render.views import render
 
 ANIMATIONS = {"gif": encode_gif, "webp": encode_webp, "mp4": encode_mp4}
 LOOPS = ("gif", "webp")  # which may be smaller than the pictures
-SPRITES, LAYERED = "sprites", "ora"
+SPRITES, LAYERED, TRACED = "sprites", "ora", "svg"
 UNSEEN = 0.05  # of a view in the drawn look: worth a word
 DEPTH_FILE = "depth.json"  # the scale of depth pictures
 
@@ -38,7 +39,8 @@ def render_files(
         trained: what is rendered.
         named: cameras with the names of their pictures, without ending.
         layers: names out of LAYERS; several are written as NAME-LAYER.png.
-        formats: names out of `nerf.options.FORMATS`: files of all views of the first layer.
+        formats: names out of `nerf.options.FORMATS`: files of the first layer, of all views
+            together but for "svg".
         animated_px: see `turntable_files`.
         progress: told which view is rendered.
         say: told which view shows most that is in no drawing.
@@ -47,16 +49,21 @@ def render_files(
         ToonsetError: see `Rendering.picture`, `turntable_files` and `encode_ora`.
     """
     in_layers: list[tuple[str, list[PaintLayer]]] = []
+    traced: dict[str, bytes] = {}
     if LAYERED in formats:
         check_layered(layers[0])
+    if TRACED in formats:
+        check_traced(layers[0])
     baked, turning, depths = Baked.of(trained), [], []
     cameras = [camera for _, camera in named]
     levels = DepthLevels.of(trained.hull, cameras)
-    kept_px = animated_px if set(formats) <= set(LOOPS) else None  # whole turns are large
+    kept_px = animated_px if set(formats) <= {*LOOPS, TRACED} else None  # whole turns are large
     unseen: dict[str, float] = {}
     for number, (stem, camera) in enumerate(named):
         progress(f"rendering {number + 1} of {len(named)}")
         view = render(baked, camera)
+        if TRACED in formats:
+            traced[f"{stem}.{TRACED}"] = svg_of(view, stem)
         for layer in layers:
             data, picture = view.png(layer, levels=levels)
             name = f"{stem}.png" if len(layers) == 1 else f"{stem}-{layer}.png"
@@ -73,7 +80,8 @@ def render_files(
         say(f"{worst}: {unseen[worst]:.0%} of it {guessed}")
     if depths:
         yield DEPTH_FILE, _json(levels.to_json(depths))
-    of_pictures = [name for name in formats if name != LAYERED]
+    yield from traced.items()
+    of_pictures = [name for name in formats if name not in (LAYERED, TRACED)]
     yield from turntable_files(of_pictures, turning, trained, cameras, animated_px).items()
     if in_layers:
         yield f"turntable.{LAYERED}", encode_ora(in_layers, turning)
@@ -89,7 +97,7 @@ def turntable_files(
     """Return turntable.gif, .webp, .mp4 and sprites.png with sprites.json, by name.
 
     Args:
-        formats: names out of `nerf.options.FORMATS`, but for layers.
+        formats: names out of `nerf.options.FORMATS`, but for layers and SVG.
         pictures: one per camera, in the order of the turn.
         trained: what they show.
         cameras: that saw them.

@@ -16,8 +16,7 @@ from toonset.errors import BundleError, OutputError, PaletteError, ToonsetError
 from toonset.nerf.fields.trained_field import NO_DRAWINGS, NO_LINES, NO_PALETTE, TrainedField
 from toonset.nerf.look.blend import SOLID, DrawnView, Geometry, blend_view
 from toonset.nerf.options import LAYERS
-from toonset.nerf.render.depth_levels import DepthLevels
-from toonset.nerf.render.normals import normal_picture
+from toonset.nerf.render.depth import DepthLevels, normal_picture
 from toonset.palette.pixels.labels import UNLABELLED
 from toonset.view import small_png
 from toonset.write import write_bytes

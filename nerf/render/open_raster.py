@@ -153,11 +153,23 @@ def layered(view: Rendering, layer: str, picture: Picture) -> list[PaintLayer]:
     upper, edge, lower, rest = _edges(look, rest, pure, colors)
     flat = _straight(rest, colors, lower)
     found = [_cut(LINES, ink, lines)]
-    for number, name in reversed(list(enumerate(_names(look)))):
+    for number, name in reversed(list(enumerate(paint_names(look.paints, look.inks)))):
         share = np.where(upper == number, edge, np.where(lower == number, rest.alpha, 0))
         color = np.where((upper == number)[..., None], colors[number], flat)
         found.append(_cut(name, color, share))
     return [one for one in found if one is not None]
+
+
+def paint_names(paints: UInt8[np.ndarray, "paints 3"], inks: int) -> tuple[str, ...]:
+    """Return what to call the paints, each otherwise; of several inks each has its code, too.
+
+    Args:
+        paints: their colours.
+        inks: how many of them, the last, are no palette colours.
+    """
+    codes = [(r, g, b) for r, g, b in paints.tolist()]
+    plain = len(codes) - inks
+    return with_codes([*distinct_names(codes[:plain]), *[INK] * inks], codes)
 
 
 def _look(view: Rendering, layer: str, picture: Picture) -> _Look:
@@ -260,13 +272,6 @@ def _straight(
     off = rest.weight * rest.alpha * np.abs(color - plain).max(axis=-1)
     covered = (rest.weight < 1) & (off <= UNSEEN)
     return np.where(covered[..., None], plain, color)
-
-
-def _names(look: _Look) -> list[str]:
-    """Return what to call the paints, each otherwise; of several inks each has its code, too."""
-    codes = [(r, g, b) for r, g, b in look.paints.tolist()]
-    paints = len(codes) - look.inks
-    return list(with_codes([*distinct_names(codes[:paints]), *[INK] * look.inks], codes))
 
 
 def _cut(name: str, color: Color, share: Share) -> PaintLayer | None:

@@ -22,10 +22,9 @@ from toonset.nerf.fields.triplane import TriplaneField
 from toonset.nerf.kernels.threads import one_thread
 from toonset.nerf.look.blend import Geometry
 from toonset.nerf.render.baked import Baked
-from toonset.nerf.render.cast import cast
+from toonset.nerf.render.cast import ViewRays, cast
 from toonset.nerf.render.labels import NONE, labels_of, palette_shares
 from toonset.nerf.render.layers import FieldView, Rendering
-from toonset.nerf.render.rays import ViewRays
 from toonset.palette.pixels.labels import UNLABELLED
 from toonset.raster import nearest, taken
 

@@ -1,6 +1,6 @@
 """Choose from where a page shows a figure: rings of views, which pass through the drawings.
 
-The first ring is as high as the sheet is drawn, see `toonset.nerf.render.turn_angles`. A further
+The first ring is as high as the sheet is drawn, see `toonset.nerf.render.turntable`. A further
 one lies above it, and one below, where at least LEAST drawings stand so high: they are what its
 look rests on. Drawings that no ring passes through have a view of their own.
 """
@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from toonset.camera import Camera
-from toonset.nerf.render.turn_angles import RING, Angles, ring_of, turn_angles
+from toonset.nerf.render.turntable import RING, Angles, ring_of, turn_angles
 
 VIEWS = 72  # of a ring: steps of 5 degrees
 LEAST = 3  # drawings at another elevation that carry a ring

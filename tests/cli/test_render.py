@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 import cv2
 import numpy as np
 import pytest
+from PIL import Image
 
 from toonset.dataset.images.picture import load_rgba
 from toonset.nerf.render.animation import INSTALL_AV
@@ -123,6 +124,25 @@ def test_a_turn_in_layers(lined: Path, toonset, tmp_path: Path) -> None:
         assert b'"lines"' not in file.read("stack.xml")
     layers = toonset(*turn, tmp_path / "no", "--format", "ora", "--layer", "depth")
     assert "layer 'depth': has no paints for turntable.ora" in layers.reason
+    assert not (tmp_path / "no").exists()
+
+
+def test_a_turn_as_vectors(lined: Path, toonset, tmp_path: Path) -> None:
+    out = tmp_path / "vectors"
+    turn = ("render", lined, "--turntable", 2, "-o")
+    done = toonset(*turn, out, "--format", "svg", "--json")
+    assert done.json["svg"] == ["000.svg", "001.svg"]
+    assert done.json["together"] == []
+    root = ElementTree.parse(out / "001.svg").getroot()
+    with Image.open(out / "001.png") as picture:
+        assert root.get("viewBox") == f"0 0 {picture.width} {picture.height}"
+    assert [group.get("id") for group in root][-1] == "lines"
+    again = toonset(*turn, out, "--format", "svg", "--no-lines", "--force", "-q")
+    assert again.code == 0
+    assert b'"lines"' not in (out / "001.svg").read_bytes()
+    layers = toonset(*turn, tmp_path / "no", "--format", "svg", "--layer", "depth")
+    assert "layer 'depth': cannot be written as SVG; let the first layer be drawn" in layers.reason
+    assert layers.code == 2
     assert not (tmp_path / "no").exists()
 
 

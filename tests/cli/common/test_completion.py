@@ -58,7 +58,7 @@ def test_options_are_completed(completed: Callable[[str], set[str]]) -> None:
         ("export bundle --to b", {"blender", "blender-synthetic"}),
         ("export bundle --to colmap --layout ", {"new", "old"}),
         ("render run --layer normal", {"normal", "normal-camera"}),
-        ("render run --format webp,s", {"webp,sprites"}),
+        ("render run --format webp,s", {"webp,sprites", "webp,svg"}),
         ("train --field tri", {"triplane"}),
         ("train --preset ", {"fast", "paper"}),
         ("train --device c", {"cpu", "cuda"}),

@@ -14,7 +14,7 @@ from PIL import Image
 
 from toonset.camera import Camera
 from toonset.nerf.hull.hull import Hull
-from toonset.nerf.render.depth_levels import LEVELS, DepthLevels
+from toonset.nerf.render.depth import LEVELS, DepthLevels
 from toonset.nerf.render.turntable import turntable
 from toonset.nerf.render.views import render
 from toonset.nerf.run.folder import read_field

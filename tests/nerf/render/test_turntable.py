@@ -12,8 +12,16 @@ import pytest
 from toonset.camera import Camera, rotation_distance
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.look.drawings import Drawing, Drawings
-from toonset.nerf.render.turn_angles import RING, angles_between, ring_of, turn_angles
-from toonset.nerf.render.turntable import FILL, between_drawings, filled_box, turntable
+from toonset.nerf.render.turntable import (
+    FILL,
+    RING,
+    angles_between,
+    between_drawings,
+    filled_box,
+    ring_of,
+    turn_angles,
+    turntable,
+)
 from toonset.nerf.render.views import render
 from toonset.nerf.train.result import Training
 

@@ -16,9 +16,8 @@ from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.hull.hull import EDGE, Hull, occupancy
 from toonset.nerf.hull.march import clip, rays_of
 from toonset.nerf.render.baked import Baked
-from toonset.nerf.render.cast import OPAQUE_FROM, cast
-from toonset.nerf.render.normals import normal_picture, normals_of
-from toonset.nerf.render.rays import ViewRays
+from toonset.nerf.render.cast import OPAQUE_FROM, ViewRays, cast
+from toonset.nerf.render.depth import normal_picture, normals_of
 from toonset.nerf.render.recolor import repaint_run
 from toonset.nerf.render.views import borders, places_within, render
 
