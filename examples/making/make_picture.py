@@ -1,17 +1,20 @@
 """Make the README's pictures from a demo.
 
-./run demo && .venv/bin/python examples/making/make_picture.py demo docs
+./run demo
+./run render demo/bundle/run --turntable 36 --size 260 --format webp -o demo/turning
+.venv/bin/python examples/making/make_picture.py demo docs
 
-turn.png has the sheet above and the turntable below; demo-*.png are the pictures that the commands
-ask to be looked at.
+turn.png has the sheet above and below it views half way between its drawings; turning.webp turns;
+demo-*.png are the pictures that the commands ask to be looked at.
 """
 
+import shutil
 import sys
 from pathlib import Path
 
 from PIL import Image, ImageDraw, ImageFont
 
-WIDTH, HEIGHT, FRAMES = 1200, 190, 9
+WIDTH, HEIGHT = 1200, 190
 CAPTION = 28
 INK = (70, 70, 70)
 
@@ -42,7 +45,7 @@ def main(demo: Path, docs: Path) -> None:
     bundle = demo / "bundle"
     save(fitted(over_white(bundle / "overlay.png"), 1000), docs / "demo-overlay.png")
     save(fitted(over_white(bundle / "palette.png"), 500), docs / "demo-palette.png")
-    save(fitted(over_white(bundle / "run" / "preview.png"), 1000), docs / "demo-preview.png")
+    shutil.copy(demo / "turning" / "turntable.webp", docs / "turning.webp")
 
 
 def save(picture: Image.Image, path: Path) -> None:
@@ -52,11 +55,11 @@ def save(picture: Image.Image, path: Path) -> None:
 def turn(demo: Path) -> Image.Image:
     drawn = [over_white(path) for path in sorted((demo / "bundle" / "images").glob("*.png"))]
     turned = sorted((demo / "turntable").glob("*.png"))
-    step = len(turned) / FRAMES
-    rendered = [over_white(turned[round(i * step)]) for i in range(FRAMES)]
+    step = len(turned) / len(drawn)
+    rendered = [over_white(turned[int((i + 0.5) * step)]) for i in range(len(drawn))]
     captions = [
         f"in: {len(drawn)} drawings, cameras unknown",
-        f"out: {FRAMES} of {len(turned)} rendered views, cameras found by toonset",
+        f"out: {len(rendered)} views that nobody drew, half way between them",
     ]
     return page(captions, [row(drawn), row(rendered)])
 
