@@ -1,7 +1,7 @@
 """Make the README's pictures from a demo.
 
 ./run demo
-./run render demo/bundle/run --turntable 36 --size 260 --format webp -o demo/turning
+./run render demo/bundle/run --turntable 24 --size 200 --format webp -o demo/turning
 .venv/bin/python examples/making/make_picture.py demo docs
 
 turn.png has the sheet above and below it views half way between its drawings; turning.webp turns;

@@ -1,8 +1,8 @@
-"""Take the lines round figures off drawings that a field is fitted to.
+"""Take the lines round figures off few drawings that a field is fitted to.
 
 A line along a figure's outline is seen by one drawing alone: others show the paint of the body
-there. What explains that best is a figure without its rim. The drawn look draws the line anew;
-under it goes the nearest paint.
+there. Of few drawings a figure without its rim explains that best. The drawn look draws the line
+anew; under it goes the nearest paint.
 """
 
 from __future__ import annotations

@@ -110,7 +110,7 @@ def fit_field(
     if options.carve and agree:
         ready = agree_on_paint(ready, _depths(ready, hull), _height(hull))
     scene = at_most(add_mirrored_views(ready.scene, symmetry), FITTED_PX)
-    if options.carve and ready.shape is None:
+    if not ready.compared:  # few drawings
         scene = without_outlines(scene)
     clock.append(time.perf_counter())
     weights, choice = _weights(options, len(scene.frames), agree=ready.agree), None
