@@ -262,10 +262,12 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
         looks = [look.bare(those) for look, those in zip(looks, without, strict=True)]
     color, labels = mixed(looks, chosen, counts)
     shown = (chosen >= 0) & (alpha > 0)
-    kept = shown & ~torn(color, looks, np.where(shown, chosen, -1), shown, figure_px)
+    line = drawings.outline
+    pen = None if line is None else (line.width_px * scale, line.rgb)
+    kept = shown & ~torn(color, looks, np.where(shown, chosen, -1), shown, figure_px, pen)
     if not shown.any():  # as if the body were of glass
         color, labels = mixed(looks, np.zeros_like(chosen), counts)
-    color, labels = _extended(drawings, kept, color, labels, scale)
+    color, labels = _extended(kept, color, labels, pen)
     color, labels = stamped(color, labels, looks, features, depth, NEARER * drawings.height)
     mirrored = np.array([drawings.views[number].mirrored for number in numbers])
     source = np.where(shown, np.where(mirrored[chosen], MIRRORED, DRAWN), GUESSED)
@@ -280,15 +282,12 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
 
 
 def _extended(
-    drawings: Drawings,
     kept: Bool[np.ndarray, "h w"],
     color: Float[np.ndarray, "h w 3"],
     labels: UInt8[np.ndarray, "h w"],
-    scale: float,
+    pen: tuple[float, tuple[int, int, int]] | None,
 ) -> tuple[Float[np.ndarray, "h w 3"], UInt8[np.ndarray, "h w"]]:
     """Return paint that goes on beyond what is kept; lines do not."""
-    line = drawings.outline
-    pen = None if line is None else (line.width_px * scale, line.rgb)
     paint = kept & ~lines_of(color, pen)
     if not paint.any():
         paint = kept

@@ -20,7 +20,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 from toonset.camera import Camera
 from toonset.nerf.look.choose import Look, Shared
 from toonset.nerf.look.drawings import Texture
-from toonset.nerf.look.features import Feature, blots_of
+from toonset.nerf.look.features import Feature, blots_of, lines_of
 from toonset.nerf.look.paint_flow import between
 from toonset.raster import dilate
 
@@ -312,10 +312,24 @@ def torn(
     chosen: Int[np.ndarray, "h w"],
     inside: Mask,
     figure_px: float,
+    pen: tuple[float, tuple[int, int, int]] | None,
 ) -> Mask:
-    """Return small blots of a view that the drawings do not have there, and what is beside them."""
+    """Return small blots of a view that the drawings do not have there, and what is beside them.
+
+    Where there are lines, only these can be astray: a patch of paint is what a seam left of one.
+
+    Args:
+        color: of the view, in [0, 1].
+        looks: its drawings.
+        chosen: of them, by every pixel; -1: none.
+        inside: pixels of the figure.
+        figure_px: its height.
+        pen: width in the view's pixels and colour of the lines; None: there are none.
+    """
     light = cv2.cvtColor((color * 255).astype(np.uint8), cv2.COLOR_RGB2GRAY)
     (blots,) = blots_of([light], inside, [STRAY * figure_px**2], COARSE)
+    if pen:
+        blots &= lines_of(color, pen)
     for number, look in enumerate(looks):
         own = chosen == number
         if (blots & own).any():

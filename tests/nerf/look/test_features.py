@@ -161,9 +161,14 @@ def test_blots_that_no_drawing_has_are_torn_and_freckles_are_not() -> None:
     look = look_at(drawing, 1.0)
     view = drawing.copy()
     view[150:154, 120:130] = BLACK
-    off = torn(view, [look], np.zeros(FACE.shape, int), FACE, HEIGHT)
+    view[170:174, 90:100] = (0.6, 0.4, 0.3)
+    off = torn(view, [look], np.zeros(FACE.shape, int), FACE, HEIGHT, None)
     assert off[150:154, 120:130].all()
+    assert off[170:174, 90:100].all()
     assert not off[:145].any()
+    inky = torn(view, [look], np.zeros(FACE.shape, int), FACE, HEIGHT, (2.0, (0, 0, 0)))
+    assert inky[150:154, 120:130].all()  # a patch of paint is no line that is astray
+    assert not inky[160:].any()
 
 
 def test_a_face_without_features_is_left_as_it_is() -> None:
