@@ -105,7 +105,7 @@ def inked_outline(
     solid = fine > 0
     fine += 0.5
     found = _drawn(solid, np.clip(fine, 0, 1, out=fine), width_px, figure_px, HOLE_PX)
-    cover, ink = np.zeros((2, *inside_px.shape), np.float32)
+    cover, ink = (np.zeros(inside_px.shape, np.float32) for _ in found)
     cover[box], ink[box] = found
     return cover, ink
 

@@ -247,13 +247,12 @@ def test_what_the_nearest_drawing_denies_is_not_shown() -> None:
 
 def test_paint_goes_on_beyond_a_line_and_the_line_does_not() -> None:
     """Where nothing is drawn behind an arm's outline, its skin goes on."""
-    found = drawings(ring(4))
     color = np.full((40, 60, 3), 0.8, np.float32)
     color[:, 28:32] = np.array(INK) / 255
     labels = np.zeros((40, 60), np.uint8)
     labels[:, 28:32] = 1
     kept = np.broadcast_to(np.arange(60) < 32, (40, 60))
-    filled, own = _extended(found, kept, color, labels, 1.0)
+    filled, own = _extended(kept, color, labels, (LINE_PX, INK))
     np.testing.assert_array_equal(filled[:, :32], color[:, :32])
     assert np.abs(filled[:, 32:] - 0.8).max() < 1e-6
     assert (own[:, 32:] == 0).all()
