@@ -33,7 +33,7 @@ OWN = 0.5  # share of its place that shows its drawing
 NEARER = 0.09  # of the figure's height: what hides a feature is so much nearer
 FEWEST_PX = 6  # of a view
 FINE, SOFT = 1.4, 0.4  # pixels of a drawing per pixel of a view: from here on it is blurred; sigma
-STRAY, COARSE = 3e-3, 24  # of the squared height: smaller blots of a view; steps of theirs
+STRAY, COARSE = 1e-3, 24  # of the squared height: smaller blots of a view; steps of theirs
 
 Mask = Bool[np.ndarray, "h w"]
 
