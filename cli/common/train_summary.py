@@ -110,7 +110,9 @@ def _planes(found: dict[str, Any] | None) -> list[str]:
 
 
 def _set_right(found: dict[str, Any]) -> str:
-    """Return which drawings the fit is judged by, if not by those that were given."""
+    """Return which drawings the fit is measured on, if not on those that were given."""
+    if found["without_outlines"]:
+        return " without their outlines"
     steps = [found[name] for name in ("registration", "unwarping")]
     return " as set right" if any(step and step["applied"] for step in steps) else ""
 

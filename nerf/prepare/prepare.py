@@ -9,6 +9,7 @@ of sections are left as they are: so few outlines would be bent to fit each othe
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 from toonset.dataset.bundle.scene import Scene
@@ -16,6 +17,7 @@ from toonset.nerf.hull.mannequin_fit import MannequinFit
 from toonset.nerf.hull.mannequin_shape import Shape
 from toonset.nerf.hull.scene_hull import has_sections
 from toonset.nerf.options import TrainOptions
+from toonset.nerf.prepare.outlines import without_outlines
 from toonset.nerf.prepare.paint_agreement import Depths, PaintAgreement, with_paint_agreed
 from toonset.nerf.prepare.registration import Registration, register_drawings
 from toonset.nerf.prepare.to_mannequin import Posed, posed
@@ -29,7 +31,7 @@ class Prepared:
     """A scene that is ready to be fitted, and what was done to it.
 
     Attributes:
-        scene: the drawings that a field is fitted to.
+        scene: the drawings, agreeing with each other.
         drawn: what they were made of: as drawn, perhaps with room round the figures.
         registration: how cameras moved; None: switched off.
         unwarping: how drawings were bent; None: switched off.
@@ -47,6 +49,11 @@ class Prepared:
     mannequin: MannequinFit | None = None
     shape: Shape | None = None
     compared: bool = True
+
+    @cached_property
+    def fitted(self) -> Scene:
+        """Return the drawings that a field is fitted to: few ones without their outlines."""
+        return self.scene if self.compared else without_outlines(self.scene)
 
     @property
     def apart_px(self) -> float:
@@ -76,6 +83,7 @@ class Prepared:
             "registration": None if registration is None else registration.to_json(),
             "unwarping": None if unwarping is None else unwarping.to_json(),
             "paint": None if self.paint is None else self.paint.to_json(),
+            "without_outlines": self.fitted is not self.scene,
         }
 
 

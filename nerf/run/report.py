@@ -42,7 +42,8 @@ def write_run(
 ) -> dict[str, Any]:
     """Write all files of a run into an existing folder; return the content of metrics.json.
 
-    Its figures of training views are those of the drawings as they were fitted: set right.
+    Its figures of training views are those of the drawings as they were fitted: set right, and few
+    ones without their outlines.
 
     Args:
         folder: where to.
@@ -55,7 +56,7 @@ def write_run(
     views = between_views(baked)
     metrics = {
         **_course(training, held_out),
-        "train": compared(baked, training.prepared.scene),
+        "train": compared(baked, training.prepared.fitted),
         "test": None if test is None else compared(baked, test),
         "sources": None if training.result.drawings is None else _sources(views),
         "verdict": verdict_of(training, scene, baked).to_json(),

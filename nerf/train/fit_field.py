@@ -31,7 +31,6 @@ from toonset.nerf.hull.tolerance import HullEvidence
 from toonset.nerf.kernels import loss_terms as terms
 from toonset.nerf.kernels.threads import SIDES
 from toonset.nerf.options import STEPS_ON_SECTIONS, STEPS_ON_SHAPE, USUAL_STEPS, TrainOptions
-from toonset.nerf.prepare.outlines import without_outlines
 from toonset.nerf.prepare.paint_agreement import Depths
 from toonset.nerf.prepare.prepare import Prepared, agree_on_paint, prepare
 from toonset.nerf.prepare.smaller import at_most
@@ -109,9 +108,7 @@ def fit_field(
     hull, evidence = _hull(whole, options, ready, symmetry)
     if options.carve and agree:
         ready = agree_on_paint(ready, _depths(ready, hull), _height(hull))
-    scene = at_most(add_mirrored_views(ready.scene, symmetry), FITTED_PX)
-    if not ready.compared:  # few drawings
-        scene = without_outlines(scene)
+    scene = at_most(add_mirrored_views(ready.fitted, symmetry), FITTED_PX)
     clock.append(time.perf_counter())
     weights, choice = _weights(options, len(scene.frames), agree=ready.agree), None
     if options.field == "auto" and options.resolution is None and field_of is None:
@@ -170,7 +167,7 @@ def _choice(
     ready: Prepared, hull: Hull, weights: Weights, options: TrainOptions, device: torch.device
 ) -> FieldChoice:
     """Return how fine the planes are that this scene needs; the seed is set anew."""
-    scene, samples = at_most(ready.scene, FITTED_PX), MOST_SAMPLES // TRIAL_STRIDE
+    scene, samples = at_most(ready.fitted, FITTED_PX), MOST_SAMPLES // TRIAL_STRIDE
     step = TRIAL_STRIDE * float(hull.box.size.max()) / STEPS_ALONG
     ground = Ground(scene, hull, step, samples, weights, options, device)
     planes = partial(planes_of, hull)

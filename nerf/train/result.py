@@ -72,5 +72,5 @@ class Training:
 
     @property
     def seen(self) -> Scene:
-        """Return what the field was fitted to: the drawings, and the mirror images of some."""
+        """Return the drawings, agreeing with each other, and the mirror images of some."""
         return add_mirrored_views(self.prepared.scene, self.symmetry)

@@ -6,7 +6,7 @@ from typing import Any
 from toonset.cli.common.train_summary import summary
 
 
-def metrics(**drawings: dict[str, Any] | None) -> dict[str, Any]:
+def metrics(**drawings: dict[str, Any] | bool | None) -> dict[str, Any]:
     figures = {"psnr": 30.0, "psnr_mask": None}
     return {
         "train": figures,
@@ -25,7 +25,8 @@ def metrics(**drawings: dict[str, Any] | None) -> dict[str, Any]:
                 "views": {"a.png": 0.01, "b.png": 0.027},
             },
         },
-        "drawings": dict.fromkeys(("mannequin", "registration", "unwarping")) | drawings,
+        "drawings": dict.fromkeys(("mannequin", "registration", "unwarping", "without_outlines"))
+        | drawings,
     }
 
 
@@ -57,6 +58,11 @@ def test_drawings_that_agree_are_fitted_as_they_are() -> None:
     assert "fit to the drawings: PSNR 30.00 dB" in summary(
         Path("run"), metrics(registration=step(-5, applied=False))
     )
+
+
+def test_few_drawings_are_fitted_without_their_outlines() -> None:
+    found = summary(Path("run"), metrics(without_outlines=True))
+    assert "fit to the drawings without their outlines: PSNR 30.00 dB" in found
 
 
 def test_evidence_is_for_those_who_ask() -> None:

@@ -65,7 +65,8 @@ def test_drawings_without_lines_stay_as_they_are() -> None:
 def test_a_dark_line_does_not_thin_a_light_figure() -> None:
     """Fitted with their lines these figures lose a seventh of their area."""
     scene = sheet()
-    field = fit_field(scene, TrainOptions(steps=60, resolution=48)).result
+    training = fit_field(scene, TrainOptions(steps=60, resolution=48))
+    assert training.prepared.to_json()["without_outlines"]
     for frame in scene.frames:
-        found = render(field, frame.camera).alpha
+        found = render(training.result, frame.camera).alpha
         assert found.sum() == pytest.approx(frame.rgba[..., 3].sum() / 255, rel=0.04)
