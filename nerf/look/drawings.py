@@ -7,11 +7,12 @@ from functools import cached_property
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, Float16, Shaped, UInt8
+from jaxtyping import Bool, Float, Float16, Shaped, UInt8, UInt16
 
 from toonset.camera import Camera
 from toonset.dataset.silhouettes.mask import mask_of
 from toonset.nerf.hull.mannequin_shape import Shape
+from toonset.nerf.look.border_lines import Ground, lined_pairs
 from toonset.nerf.look.features import Features, features_of
 from toonset.nerf.look.outline import Outline, without_crumbs
 from toonset.nerf.look.paint_labels import paint_labels, repainted
@@ -19,6 +20,7 @@ from toonset.nerf.look.shade import Shade
 from toonset.nerf.look.silhouette import Rim, rim_of
 from toonset.nerf.look.step_lines import StepLines, step_edges
 from toonset.palette.palette import Shadow
+from toonset.palette.pixels.labels import nearest_colors
 from toonset.raster import depth_inside, distance_to, nearest, sized_parts, taken
 
 STEP = 0.03  # of the figure's height: surfaces so far apart in depth are two
@@ -161,6 +163,13 @@ class Drawings:
             return self.paints
         return np.concatenate([self.repaint, self.paints[len(self.repaint) :]])
 
+    def ink(self, outline: Outline) -> tuple[int, UInt8[np.ndarray, " 3"]]:
+        """Return the label that the ink of a line has in `paints`, and the colour to show."""
+        rgb = np.array(outline.rgb, np.uint8)
+        label = int(nearest_colors(rgb[None], self.paints)[0])
+        new = self.new_paints[label]
+        return label, rgb if np.array_equal(new, self.paints[label]) else new
+
     @cached_property
     def textures(self) -> tuple[Texture, ...]:
         """Return the drawings, ready to be looked up, in the colours to show."""
@@ -184,6 +193,18 @@ class Drawings:
             return depth_of(view.levels, self.depths)
         assert self.shape is not None
         return self.shape.seen(view.camera).depth
+
+    @cached_property
+    def lined_pairs(self) -> UInt16[np.ndarray, " pairs"]:
+        """Return the pairs of `paints` between which the artist draws a line."""
+        if self.outline is None:
+            return np.zeros(0, np.uint16)
+        grounds = (
+            texture.ground
+            for texture, view in zip(self.textures, self.views, strict=True)
+            if not view.mirrored
+        )
+        return lined_pairs(grounds, self.outline.width_px)
 
     @cached_property
     def half(self) -> Drawings:
@@ -266,6 +287,14 @@ class Texture:
         inside = self.whole[..., 3] > 0.5
         drawn = self.in_own / np.float32(255)
         return features_of(self.paint, self.labels, inside, self.pen, self.figure_px, drawn)
+
+    @cached_property
+    def ground(self) -> Ground:
+        """Return its paints without lines and features."""
+        found = self.features
+        inside = (self.whole[..., 3] > 0.5) & (found.numbers == 0)
+        drawn = self.in_own / np.float32(255)
+        return Ground.of(drawn, found.labels, inside, self.pen, self.figure_px)
 
     @cached_property
     def afloat(self) -> Bool[np.ndarray, "height width"]:

@@ -34,7 +34,7 @@ from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.silhouettes.displacement import CONTROLS, Bends
 from toonset.dataset.silhouettes.mask import mask_of
-from toonset.nerf.look.strokes import outline_width
+from toonset.nerf.look.outline import outline_width
 from toonset.nerf.prepare.unwarp import Warp, warped
 from toonset.raster import depth_inside, nearest
 

@@ -21,8 +21,8 @@ from toonset.dataset.silhouettes.register import Fit
 from toonset.nerf.hull.hull import LEVEL
 from toonset.nerf.hull.mannequin_fit import MannequinFit, mannequin_fit, paired, parts_left
 from toonset.nerf.hull.mannequin_shape import FINER, Shape, ShapeView, shape_of
+from toonset.nerf.look.outline import outline_width
 from toonset.nerf.look.step_lines import learn_steps, step_places
-from toonset.nerf.look.strokes import outline_width
 from toonset.nerf.prepare.mannequin_bends import InnerLines, fit_bends
 from toonset.nerf.prepare.smaller import at_most
 from toonset.nerf.prepare.unwarp import MOST, Unwarping, Warp, warped

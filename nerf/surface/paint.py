@@ -16,7 +16,7 @@ from scipy import ndimage
 
 from toonset.nerf.look.drawings import SQUARE, Drawings, Texture
 from toonset.nerf.look.step_lines import step_edges
-from toonset.nerf.look.strokes import SOFT, lines_of, strokes_of
+from toonset.nerf.surface.strokes import SOFT, lines_of, strokes_of
 from toonset.raster import depth_inside, distance_to, nearest, parts
 
 STEP = 0.015  # of the figure's height: an outline may be drawn where depth steps by so much

@@ -10,22 +10,27 @@ import pytest
 
 from tests.nerf.look.painted import (
     ARM,
+    BELT,
     INK,
     LINE_PX,
     PALETTE,
     camera_at,
+    depth_of,
     draw,
     drawings,
     geometry,
     ring,
+    scene_of,
     unseen,
     with_an_arm,
 )
 from toonset.nerf.look.blend import DRAWN, GUESSED, MIRRORED, _extended, blend_view, flanking
+from toonset.nerf.look.build import drawings_of
 from toonset.nerf.look.drawings import Drawings, Original
 from toonset.nerf.look.outline import Outline
 from toonset.nerf.render.layers import color_picture
 from toonset.nerf.score.metrics import compare
+from toonset.raster import dilate
 from toonset.view import over_white
 
 
@@ -109,6 +114,35 @@ def test_drawings_without_lines_stay_without() -> None:
     view = blend_view(bare, geometry(camera_at(0.4)))
     assert view.ink.sum() == 0
     assert (view.rgb.max(axis=-1)[view.alpha > 0.9] > 0.3).all()
+
+
+def test_a_line_between_paints_goes_on_over_the_seam_of_two_drawings() -> None:
+    scene = scene_of(ring())
+    frames = []
+    for number, frame in enumerate(scene.frames):
+        rgba = frame.rgba.copy()
+        belt = (np.abs(rgba[..., :3].astype(int) - BELT).sum(axis=-1) < 30).astype(np.uint8)
+        rgba[(dilate(belt > 0, 2) & (belt == 0)) & (rgba[..., 3] == 255), :3] = INK
+        if number % 2:  # the hand slips: lines of neighbours do not meet
+            rgba = np.roll(rgba, 10, axis=0)
+        frames.append(replace(frame, rgba=rgba))
+    scene = replace(scene, frames=tuple(frames))
+    found = drawings_of(scene, scene, depth_of, bent=False)
+    assert found is not None
+    assert len(found.lined_pairs) == 1
+
+    def gaps() -> int:
+        view = blend_view(found, geometry(camera_at(np.pi / 8)))
+        paint = (view.rgb * 255).astype(int)
+        skin, belt = (
+            np.abs(paint - color).sum(axis=-1) < 60 for color in (PALETTE[0], np.array(BELT))
+        )
+        return int((dilate(skin, 1) & belt).sum())
+
+    with_rule = gaps()
+    found.__dict__["lined_pairs"] = np.zeros(0, np.uint16)
+    assert with_rule == 0
+    assert gaps() > 2
 
 
 def test_recolouring_changes_one_paint_and_leaves_the_others(egg: Drawings) -> None:

@@ -1,0 +1,117 @@
+"""Close the lines between paints where a view has pieces of two drawings.
+
+The drawings tell of every pair of paints whether the artist draws a line along all of its borders.
+Where a view has such a border without a line, because a seam runs there, one is drawn. Pairs with a
+line along a part of their border are left as they are: there it stands for a step in depth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, UInt8, UInt16
+
+from toonset.nerf.look.features import lines_of
+from toonset.raster import dilate, distance_to, nearest, taken
+
+LINED = 0.9  # of the border of two paints: they have a line
+LEAST = 0.05  # of the figure's height: shorter borders tell nothing
+SMOOTH = 0.008  # of the height: borders are smooth over so much
+BROKEN = 0.6  # times the pen's width, to the nearest line: so far away there is none
+PAINTS = 256  # a pair is its lower paint times so many, and the higher one
+NONE = 0xFFFF  # no pair
+
+Mask = Bool[np.ndarray, "height width"]
+Labels = UInt8[np.ndarray, "height width"]
+Pairs = UInt16[np.ndarray, " pairs"]
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """A picture's paints without its lines.
+
+    Attributes:
+        labels: (height, width) the paint, under lines and features and beyond the figure, too.
+        lined: (height, width) pixels in which lines are, and beside them.
+        inside: (height, width) pixels of the figure.
+        figure_px: height of the figure.
+    """
+
+    labels: Labels
+    lined: Mask
+    inside: Mask
+    figure_px: float
+
+    @classmethod
+    def of(
+        cls,
+        paint: Float[np.ndarray, "height width 3"],
+        labels: Labels,
+        inside: Mask,
+        pen: tuple[float, tuple[int, int, int]] | None,
+        figure_px: float,
+    ) -> Ground:
+        """Return the paints under a drawing's lines, which `pen` drew."""
+        lined = lines_of(paint, pen) & inside
+        kept = inside & ~lined if (inside & ~lined).any() else np.ones_like(inside)
+        return cls(taken(labels, nearest(kept)), lined, inside, figure_px)
+
+    def borders(self) -> UInt16[np.ndarray, "height width"]:
+        """Return every pixel's pair of paints, whose border it lies at; NONE elsewhere."""
+        side = round(SMOOTH * self.figure_px) | 1
+        smooth = cv2.medianBlur(self.labels, side) if side > 1 else self.labels
+        pairs = np.full(smooth.shape, NONE, np.uint16)
+        for here, there in (
+            ((slice(None), slice(-1)), (slice(None), slice(1, None))),
+            ((slice(-1), slice(None)), (slice(1, None), slice(None))),
+        ):
+            apart = (smooth[here] != smooth[there]) & self.inside[here] & self.inside[there]
+            one, other = (smooth[side_of][apart].astype(np.uint16) for side_of in (here, there))
+            pair = np.minimum(one, other) * np.uint16(PAINTS) + np.maximum(one, other)
+            pairs[here][apart] = pairs[there][apart] = pair
+        return pairs
+
+    def broken(self, pen_px: float) -> Mask:
+        """Return the pixels that no line is near."""
+        if not self.lined.any():
+            return np.ones_like(self.lined)
+        return distance_to(self.lined) > max(1.0, BROKEN * pen_px)
+
+
+def lined_pairs(grounds: Iterable[Ground], pen_px: float) -> Pairs:
+    """Return the pairs of paints between which an artist draws a line.
+
+    Args:
+        grounds: of the drawings.
+        pen_px: width of their lines.
+    """
+    length, lined = np.zeros(NONE + 1), np.zeros(NONE + 1)
+    for ground in grounds:
+        pairs = ground.borders()
+        for total, these in ((length, pairs), (lined, pairs[~ground.broken(pen_px)])):
+            total += np.bincount(these.ravel(), minlength=NONE + 1) / ground.figure_px
+    length[NONE] = 0
+    always = (length > 2 * LEAST) & (lined > LINED * length)  # counted on both sides
+    return np.flatnonzero(always).astype(np.uint16)
+
+
+def missing_lines(ground: Ground, lined: Pairs, pen_px: float) -> Float[np.ndarray, "height width"]:
+    """Return how far lines that a view lacks cover every pixel, 0 to 1.
+
+    Args:
+        ground: of the view.
+        lined: the pairs that have lines.
+        pen_px: width of the lines.
+    """
+    wanted = np.zeros(NONE + 1, dtype=bool)
+    wanted[lined] = True
+    at = wanted[ground.borders()]
+    gaps = at & ground.broken(pen_px)
+    if not gaps.any():
+        return np.zeros(gaps.shape, np.float32)
+    drawn = at & dilate(gaps, max(1, round(pen_px)))  # until it meets the line that is there
+    cover = np.clip(pen_px / 2 - distance_to(drawn), 0, 1).astype(np.float32)
+    return np.where(ground.inside, cover, 0)
