@@ -59,6 +59,7 @@ FLOORS: dict[str, tuple[str, ...]] = {
         "score",
         "run",
         "@training viewer",
+        "@leave_one_out",
     ),
     "cli": ("common", "editor", "@", "batch"),  # a verb imports no other verb; batch runs them
 }

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from toonset.dataset.split_folder.load import split_sheet as split_sheet
     from toonset.errors import ToonsetError as ToonsetError
     from toonset.mesh import Mesh as Mesh
-    from toonset.nerf.fields.trained_field import TrainedField as TrainedField
+    from toonset.nerf.leave_one_out import leave_one_out as leave_one_out
     from toonset.nerf.options import TrainOptions as TrainOptions
     from toonset.nerf.render.layers import Rendering as Rendering
     from toonset.nerf.render.turntable import turntable as turntable
@@ -68,7 +68,7 @@ _PLACES = {  # module -> its public names; "name=there" where it is called other
     "dataset.split_folder.load": "Sheet split_sheet",
     "errors": "ToonsetError",
     "mesh": "Mesh",
-    "nerf.fields.trained_field": "TrainedField",
+    "nerf.leave_one_out": "leave_one_out",
     "nerf.options": "TrainOptions",
     "nerf.render.layers": "Rendering",
     "nerf.render.turntable": "turntable",
