@@ -48,7 +48,7 @@ SHOWN = {  # figures in a notebook: heading, number format
 
 @dataclass(frozen=True, eq=False)
 class LeaveOneOut:
-    """Every drawing as a field predicts it that was trained without it.
+    """Predictions of drawings by fields that were trained without them.
 
     Attributes:
         name: of the scene.

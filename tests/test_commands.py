@@ -46,6 +46,7 @@ ELSEWHERE = {  # commands that do not run here, and where they do
     "./run demo": "tests/test_run.py has its steps, the README the same commands",
     "./run test": "would run this test",
     "./run lint": "every change runs it: .ci/run",
+    "./run docs": "every change runs it: .ci/run",
     "./run wheel": "every change runs it: .ci/run",
     "./run bench": "minutes to hours: `test_benches_run_as_they_stand` measures next to nothing",
     "python -m bench": "as ./run bench",
