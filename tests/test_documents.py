@@ -103,8 +103,9 @@ def test_api_reference_has_every_public_name() -> None:
 
 def test_site_lists_every_document_once() -> None:
     shown = re.findall(r"^ +- (\w+\.md)$", text_of("mkdocs.yml"), re.MULTILINE)
-    of_root = ["changelog.md", "contributing.md", "index.md"]  # .ci/site.py makes these
-    assert sorted(shown) == sorted([*of_root, *(p.name for p in (ROOT / "docs").glob("*.md"))])
+    made = ["changelog.md", "contributing.md", "index.md"]  # by .ci/site.py
+    made += [f"notebook_{path.stem}.md" for path in ROOT.glob("examples/*.ipynb")]
+    assert sorted(shown) == sorted([*made, *(p.name for p in (ROOT / "docs").glob("*.md"))])
 
 
 @pytest.mark.parametrize("document", sorted({*DOCUMENTS} - {"docs/formats.md"}))
