@@ -70,6 +70,7 @@ def test_cameras_are_as_right_as_the_notebook_says(ran: str) -> None:
     assert all(abs(float(off)) < 3 * float(sigma) for off, sigma in rows)
     assert float(re.findall(r"worst with the mannequin: ([\d.]+)", ran)[0]) < 5
     assert float(re.findall(r"worst without a body: ([\d.]+)", ran)[0]) < 10
+    assert "'K': (3, 3), 'world_from_camera': (4, 4)" in ran
 
 
 @pytest.mark.parametrize("ran", ["palette.ipynb"], indirect=True)
@@ -88,10 +89,12 @@ def test_colours_are_those_that_were_drawn(ran: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("ran", ["few_views.ipynb"], indirect=True)
-def test_more_drawings_predict_better(ran: str) -> None:
-    quality = [float(value) for value in re.findall(r"drawings: PSNR ([\d.]+)", ran)]
-    assert len(quality) == 3
-    assert quality[-1] > quality[0]
+def test_more_drawings_and_no_mirror_images_predict_better(ran: str) -> None:
+    told = re.findall(r"(\d) drawings, symmetric (\w+): PSNR ([\d.]+) dB, outline ([\d.]+)%", ran)
+    scores = {(count, symmetric): (float(p), float(o)) for count, symmetric, p, o in told}
+    assert list(scores) == [("4", "off"), ("6", "off"), ("6", "auto")]
+    assert scores["6", "off"] > scores["4", "off"]
+    assert scores["6", "off"][1] > scores["6", "auto"][1] + 5
     assert "mean of 4: PSNR" in ran
     assert "[_repr_png_ of Run]" in ran
     assert "[_repr_html_ of LeaveOneOut]" in ran

@@ -36,7 +36,7 @@ FLOORS: dict[str, tuple[str, ...]] = {
         "silhouettes synthetic",
         "split",
         "exporters split_folder",
-        "importers",
+        "@view_dataset importers",
     ),
     "calib": (
         "@options",
