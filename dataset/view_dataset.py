@@ -23,7 +23,6 @@ from pydantic import BaseModel, ConfigDict, Field
 from torch import Tensor
 from torch.utils.data import Dataset
 
-from toonset import frames as conventions
 from toonset.camera import Camera
 from toonset.dataset.bundle.bundle import CALIBRATION, Bundle
 from toonset.dataset.bundle.calibration_file import read_calibration
@@ -35,7 +34,7 @@ from toonset.dataset.bundle.read_scene import (
     label_name,
     read_palette_of,
 )
-from toonset.dataset.bundle.transforms_camera import camera_of
+from toonset.dataset.bundle.transforms_camera import camera_of, far_pinhole_of
 from toonset.dataset.bundle.transforms_read import member, read_frames, transforms_file
 from toonset.dataset.bundle.transforms_schema import (
     Focal,
@@ -313,10 +312,7 @@ def _view(
     """Return a view; its far pinhole stands where transforms.json has it."""
     if not camera.is_orthographic:
         return _StoredView(name, camera, 1 / camera.k, 0.0, image, labels, tuple(palette), sigma)
-    assert record.toonset is not None  # no other frame is orthographic
-    centre = conventions.opencv_pose_from_opengl(np.array(record.transform_matrix))[:3, 3]
-    distance = float(camera.rotation[2] @ (camera.target - centre))
-    error_px = record.toonset.pinhole_error_px
+    distance, error_px = far_pinhole_of(camera, record)
     return _StoredView(name, camera, distance, error_px, image, labels, tuple(palette), sigma)
 
 
