@@ -80,8 +80,8 @@ def evaluate(
     of a figure of 260. "-": the run or the picture has no such thing, or a package is missing; the
     JSON says why.
 
-    With --leave-one-out each drawing is rendered by its camera in the bundle, which was found with
-    all drawings: no training sees the drawing, but its camera, mannequin and palette did.
+    With --leave-one-out a drawing is left out of the training alone: its camera, the mannequin and
+    the palette are the bundle's, which were found with all drawings.
     """
     from toonset.dataset.bundle.read_scene import read_scene
     from toonset.nerf.run.folder import read_field

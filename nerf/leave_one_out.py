@@ -1,14 +1,13 @@
 """Measure new views where the truth is known: leave every drawing out, train on the others.
 
-The held-out protocol of NeRF papers, made for a handful of drawings: for each of them a field is
-trained on all others, rendered by the camera of the one that was left out, and compared with it by
-the figures of `toonset evaluate`. What the training never sees of the drawing is its pixels, its
-outline and its camera. What it was still part of stands before training, as the poses that NeRF
-papers estimate from all photographs together: the bundle's cameras, the mannequin as it was fitted,
-and the bundle's palette, where it has one.
+The held-out protocol for a handful of drawings: for each of them a field is trained on all others,
+rendered by the camera of the drawing that was left out, and scored with the figures of `toonset
+evaluate`. Training sees neither pixels nor outline nor camera of that drawing. What precedes the
+training does: the bundle's cameras, the fitted mannequin and the palette come from all drawings, as
+NeRF papers take poses that were estimated from all photographs.
 
-`toonset.nerf.score.left_out` asks the same of one trained field, in a second: there the field has
-seen the drawing, which is left out of the drawn look alone.
+`toonset.nerf.score.left_out` asks the same of one trained field, in a second: that field has seen
+the drawing, which is left out of the drawn look only.
 
 Source: Geisser 1975, "The predictive sample reuse method" (leave one out).
 """
@@ -121,13 +120,13 @@ def leave_one_out(
     One training per view, by `train` with the same options and seed; on a CPU the same bundle,
     options and threads give the same figures, unless `options.budget_s` ends a training.
 
-    A view's camera is the bundle's own: it was calibrated together with the other drawings, this
-    one among them, and is not searched again. That is the usual protocol, but it is a little
-    kinder than a drawing from elsewhere would be. The same holds of the mannequin as it was fitted
-    and of a palette that the bundle has; a bundle without one gets a palette from the drawings that
-    are trained on. Nor does the camera follow them where `options.register` moves theirs:
-    `psnr_shift` forgives that. Where `options.symmetric` is not "off", the mirror image of another
-    drawing may show the side that was left out, as it does in any new view.
+    A view's camera is the bundle's: it was calibrated together with all drawings, this one among
+    them, and is not calibrated again without it. That is the usual protocol, and a little kinder
+    than a drawing from elsewhere would be. The same holds for the mannequin as it was fitted, and
+    for the bundle's palette; a bundle without one gets a palette of the drawings that are trained
+    on. Where `options.register` moves the cameras of training, this one stays; `psnr_shift` allows
+    for that. Unless `options.symmetric` is "off", the mirror image of another drawing may show the
+    side that was left out, as in any new view.
 
     Args:
         bundle: posed drawings, three or more that show a figure.
