@@ -35,8 +35,9 @@ FLOORS: dict[str, tuple[str, ...]] = {
         "bundle mannequin",
         "silhouettes synthetic",
         "split",
-        "exporters split_folder",
-        "@view_dataset importers",
+        "@stored_views exporters split_folder",
+        "@packed_views importers",
+        "@view_dataset",
     ),
     "calib": (
         "@options",
