@@ -55,7 +55,7 @@ def ran(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     (folder / "notebook.py").write_text(script(request.param), encoding="utf-8")
     no_display = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
     command = [sys.executable, "notebook.py"]
-    limits: dict[str, Any] = {"capture_output": True, "text": True, "timeout": 900}
+    limits: dict[str, Any] = {"capture_output": True, "text": True, "timeout": 1800}
     done = subprocess.run(command, cwd=folder, env=no_display, check=False, **limits)
     assert done.returncode == 0, done.stderr
     return done.stdout
