@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag
+from toonset.errors import UsageError
 from toonset.write import check_output
 
 if TYPE_CHECKING:
@@ -38,8 +39,17 @@ COLUMNS = {  # of the table: heading, number format
 def evaluate(
     run: Annotated[Path, typer.Argument(help="A run folder, as `toonset train` writes it.")],
     test: Annotated[
-        Path, typer.Option("--test", help="A transforms.json with RGBA pictures, or its folder.")
-    ],
+        Path | None,
+        typer.Option("--test", help="A transforms.json with RGBA pictures, or its folder."),
+    ] = None,
+    leave_one_out: Annotated[
+        bool,
+        typer.Option(
+            "--leave-one-out",
+            help="Instead of --test: for each drawing of the bundle train anew on all others, with "
+            "the run's options, and compare it with what they predict. As long as a training each.",
+        ),
+    ] = False,
     bundle: Annotated[
         Path | None,
         typer.Option(
@@ -69,6 +79,9 @@ def evaluate(
     with the best shift of the whole picture, "lines" the F1 of dark lines that may be off by 2 px
     of a figure of 260. "-": the run or the picture has no such thing, or a package is missing; the
     JSON says why.
+
+    With --leave-one-out a drawing is left out of the training alone: its camera, the mannequin and
+    the palette are the bundle's, which were found with all drawings.
     """
     from toonset.dataset.bundle.read_scene import read_scene
     from toonset.nerf.run.folder import read_field
@@ -76,6 +89,11 @@ def evaluate(
     from toonset.nerf.score.metrics_view import load_judges
 
     printer = Printer(as_json, quiet)
+    if leave_one_out == (test is not None):
+        raise UsageError("evaluate: give --test with held-out views, or --leave-one-out")
+    if test is None:
+        _leave_one_out(run, bundle, out, printer, force=force)
+        return
     trained, held_out = read_field(run), read_scene(test)
     seen, why_unseen = _training_scene(run, bundle)
     if out is not None:
@@ -90,6 +108,28 @@ def evaluate(
     if out is not None:
         sections = (("held-out views", scored), ("training views", own))
         _write(out, result, sections, force=force)
+    printer.result(result, _text(result))
+
+
+def _leave_one_out(
+    run: Path, bundle: Path | None, out: Path | None, printer: Printer, *, force: bool
+) -> None:
+    """Compare each drawing of a run's bundle with what trainings without it predict."""
+    from toonset.errors import BundleError
+    from toonset.nerf.leave_one_out import leave_one_out
+    from toonset.nerf.run.folder import read_field, read_options
+
+    trained, options = read_field(run), read_options(run)
+    scene, why_unseen = _training_scene(run, bundle)
+    if scene is None:
+        raise BundleError(f"{why_unseen}")
+    if out is not None:
+        check_output(out, [run, bundle], WRITTEN, force=force)
+    with_palette = trained.palette is not None
+    found = leave_one_out(scene, options, palette=with_palette, listener=printer)
+    result = found.to_json()
+    if out is not None:
+        _write(out, result, (("drawings left out of training", found.views),), force=force)
     printer.result(result, _text(result))
 
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from toonset.dataset.exporters.points import TrackedPoints
     from toonset.mesh import Mesh
 
-COLMAP_PANEL = "COLMAP"
+COLMAP_PANEL, NERFSTUDIO_PANEL = "COLMAP", "nerfstudio"
 ASTRAY_PX = 0.1  # a principal point is worth a word from here
 
 
@@ -63,6 +63,14 @@ def export(
             rich_help_panel=COLMAP_PANEL,
         ),
     ] = False,
+    pinholes: Annotated[
+        bool,
+        typer.Option(
+            "--pinholes",
+            help="Far pinholes for orthographic views, as splatfacto needs them.",
+            rich_help_panel=NERFSTUDIO_PANEL,
+        ),
+    ] = False,
     force: ForceFlag = False,
     seed: SeedOption = 0,
     as_json: JsonFlag = False,
@@ -75,6 +83,8 @@ def export(
     """
     if to != Format.colmap and (text or centre or layout != "new"):
         raise typer.BadParameter("--text, --layout and --centre belong to --to colmap")
+    if to != Format.nerfstudio and pinholes:
+        raise typer.BadParameter("--pinholes belongs to --to nerfstudio")
     from toonset.dataset.bundle.bundle import mannequin_of
     from toonset.dataset.bundle.transforms_read import transforms_file
     from toonset.dataset.exporters.common import read_views
@@ -90,7 +100,7 @@ def export(
     if target.wants_points:
         printer.progress("colouring points")
         points = _points(body, views, seed, is_given=mesh is not None)
-    job = Job(out, views, points, body, text, layout == "old", force)
+    job = Job(out, views, points, body, text, layout == "old", pinholes, force)
     for remark in () if mesh is None or body is None else body.remarks:
         printer.say(remark)
     _report(printer, to, job, target.write(job))
@@ -116,7 +126,7 @@ def _points(
 def _report(printer: Printer, to: Format, job: Job, views: Sequence[ExportView]) -> None:
     from toonset.dataset.exporters.common import largest_error_px
 
-    error_px = 0.0 if TARGETS[to].is_exact else largest_error_px(views)
+    error_px = 0.0 if TARGETS[to].holds_exactly(job) else largest_error_px(views)
     printer.say("\n".join(_summary(to, job, views, error_px)))
     count = 0 if job.points is None else len(job.points.xyz)
     values = {"out": job.out, "format": to.value, "views": len(views), "points": count}
@@ -128,7 +138,9 @@ def _summary(to: Format, job: Job, views: Sequence[ExportView], error_px: float)
     target = TARGETS[to]
     far = sum(view.camera.is_orthographic for view in views)
     lines = [f"{len(views)} {'view' if len(views) == 1 else 'views'}"]
-    if far and not target.is_exact:
+    if far and to == Format.nerfstudio and target.holds_exactly(job):
+        lines.append("orthographic (ORTHOPHOTO); for splatfacto, which knows none, add --pinholes")
+    elif far and not target.holds_exactly(job):
         lines.append(f"{far} orthographic, written as far pinholes: at most {error_px:.2f} px off")
     pairs = list(zip(job.views, views, strict=True))
     grown = max(new.camera.scale / old.camera.scale for old, new in pairs)

@@ -1,5 +1,7 @@
 """Commands run as they stand: those of the documents, in their order, and those that verbs print.
 
+So does the Python of the documents.
+
 A document has a folder of its own with the drawings that it speaks of, and nothing else: its
 commands must not stand in each other's way. Exit code 3 is fine: written, but look.
 """
@@ -9,6 +11,8 @@ import json
 import re
 import shlex
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable, Sequence
 from hashlib import sha256
 from pathlib import Path
@@ -46,6 +50,7 @@ ELSEWHERE = {  # commands that do not run here, and where they do
     "./run demo": "tests/test_run.py has its steps, the README the same commands",
     "./run test": "would run this test",
     "./run lint": "every change runs it: .ci/run",
+    "./run docs": "every change runs it: .ci/run",
     "./run wheel": "every change runs it: .ci/run",
     "./run bench": "minutes to hours: `test_benches_run_as_they_stand` measures next to nothing",
     "python -m bench": "as ./run bench",
@@ -183,6 +188,7 @@ def _six_figures(folder: Path) -> None:
 GIVEN = {  # what lies in a document's folder before its first command
     "README.md": "examples sheet.png strip.png folder held_out mesh.glb dark.ase library",
     "docs/architecture.md": "small/sheet.png small/m.obj",
+    "docs/conventions.md": "bundle",
     "docs/formats.md": "bundle sheet.png views",
     "docs/guide_batch.md": "library",
     "docs/guide_cameras.md": "eight/sheet.png eight/mannequin.obj eight/m.obj eight/points.json"
@@ -232,6 +238,35 @@ def test_commands_of_a_document_run_as_they_stand(
         serves = words[0] == "edit"
         done = interrupted("stop with Ctrl-C", given, *words) if serves else toonset(*words)
         assert done.code in (0, 3), (command, done)
+
+
+def python_blocks(document: str) -> str:
+    """Return the Python of a document, its blocks after each other."""
+    blocks = re.findall(r"^```python\n(.*?)^```", text_of(document), re.MULTILINE | re.DOTALL)
+    return "\n".join(blocks)
+
+
+@pytest.mark.parametrize(
+    ("document", "given"),
+    [
+        pytest.param(name, name, marks=pytest.mark.slow if name in SLOW else (), id=name)
+        for name in DOCUMENTS
+        if python_blocks(name)
+    ],
+    indirect=["given"],
+)
+def test_python_of_a_document_runs_as_it_stands(document: str, given: Path) -> None:
+    (given / "document.py").write_text(python_blocks(document), encoding="utf-8")
+    command = [sys.executable, "document.py"]
+    done = subprocess.run(command, cwd=given, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stderr
+
+
+def test_python_is_shown_in_no_other_way() -> None:
+    """A block of another spelling (py, indented, tilde) would not be found above."""
+    imports = re.compile(r"^\s*import \w+", re.MULTILINE)
+    shown = [name for name in DOCUMENTS if imports.search(text_of(name))]
+    assert shown == [name for name in DOCUMENTS if python_blocks(name)]
 
 
 def test_no_command_is_left_out_silently() -> None:

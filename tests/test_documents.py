@@ -7,10 +7,11 @@ from pathlib import Path
 import pytest
 import typer.main
 
+import toonset as ts
 from tests.test_layers import FLOORS, folders
 
 ROOT = Path(__file__).resolve().parents[1]
-RUN_COMMANDS = {"demo", "test", "lint", "wheel"}  # what ./run knows beyond toonset's verbs
+RUN_COMMANDS = {"demo", "test", "lint", "docs", "wheel"}  # what ./run knows beyond toonset's verbs
 DOCUMENTS = [
     "README.md",
     "CONTRIBUTING.md",
@@ -89,6 +90,22 @@ def test_links_lead_somewhere(document: str) -> None:
     links = re.findall(r"\]\(([^)#]+)\)|src=\"([^\"]+)\"", text_of(document))
     places = [one or other for one, other in links if "://" not in one + other]
     assert [p for p in places if not (ROOT / document).parent.joinpath(p).exists()] == []
+
+
+def test_api_reference_has_every_public_name() -> None:
+    shown = re.findall(r"^::: toonset\.([\w.]+)", text_of("docs/api.md"), re.MULTILINE)
+    public = [entry for names in ts._PLACES.values() for entry in names.split()]
+    renamed = {there or name for name, _, there in (entry.partition("=") for entry in public)}
+    names = [place.split(".")[-1] for place in shown]
+    assert renamed <= set(names)
+    assert len(names) == len(set(names))
+
+
+def test_site_lists_every_document_once() -> None:
+    shown = re.findall(r"^ +- (\w+\.md)$", text_of("mkdocs.yml"), re.MULTILINE)
+    made = ["changelog.md", "contributing.md", "index.md"]  # by .ci/site.py
+    made += [f"notebook_{path.stem}.md" for path in ROOT.glob("examples/*.ipynb")]
+    assert sorted(shown) == sorted([*made, *(p.name for p in (ROOT / "docs").glob("*.md"))])
 
 
 @pytest.mark.parametrize("document", sorted({*DOCUMENTS} - {"docs/formats.md"}))

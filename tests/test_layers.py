@@ -35,8 +35,9 @@ FLOORS: dict[str, tuple[str, ...]] = {
         "bundle mannequin",
         "silhouettes synthetic",
         "split",
-        "exporters split_folder",
-        "importers",
+        "@stored_views exporters split_folder",
+        "@packed_views importers",
+        "@view_dataset",
     ),
     "calib": (
         "@options",
@@ -59,6 +60,7 @@ FLOORS: dict[str, tuple[str, ...]] = {
         "score",
         "run",
         "@training viewer",
+        "@leave_one_out",
     ),
     "cli": ("common", "editor", "@", "batch"),  # a verb imports no other verb; batch runs them
 }

@@ -169,7 +169,8 @@ def test_lock_pins_one_version_with_hashes_and_no_address(name: str) -> None:
 
 def test_lock_answers_every_declared_dependency() -> None:
     declared = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    names = [*declared["project"]["dependencies"], *declared["dependency-groups"]["dev"]]
+    groups = declared["dependency-groups"].values()
+    names = [*declared["project"]["dependencies"], *(name for group in groups for name in group)]
     pins = locked("requirements.lock")
     for wanted in map(Requirement, names):
         assert canonicalize_name(wanted.name) in pins, f"{wanted}: lock again, see CONTRIBUTING.md"

@@ -35,11 +35,11 @@ if TYPE_CHECKING:
     from toonset.dataset.mesh.load import load_mesh as load_mesh
     from toonset.dataset.split_folder.load import Sheet as Sheet
     from toonset.dataset.split_folder.load import split_sheet as split_sheet
+    from toonset.dataset.view_dataset import ViewDataset as ViewDataset
     from toonset.errors import ToonsetError as ToonsetError
     from toonset.mesh import Mesh as Mesh
-    from toonset.nerf.fields.trained_field import TrainedField as TrainedField
+    from toonset.nerf.leave_one_out import leave_one_out as leave_one_out
     from toonset.nerf.options import TrainOptions as TrainOptions
-    from toonset.nerf.render.layers import Rendering as Rendering
     from toonset.nerf.render.turntable import turntable as turntable
     from toonset.nerf.render.views import render as render
     from toonset.nerf.run.folder import read_field
@@ -66,11 +66,11 @@ _PLACES = {  # module -> its public names; "name=there" where it is called other
     "dataset.images.picture": "load_picture=load_rgba",
     "dataset.mesh.load": "load_mesh",
     "dataset.split_folder.load": "Sheet split_sheet",
+    "dataset.view_dataset": "ViewDataset",
     "errors": "ToonsetError",
     "mesh": "Mesh",
-    "nerf.fields.trained_field": "TrainedField",
+    "nerf.leave_one_out": "leave_one_out",
     "nerf.options": "TrainOptions",
-    "nerf.render.layers": "Rendering",
     "nerf.render.turntable": "turntable",
     "nerf.render.views": "render",
     "nerf.run.folder": "read_run=read_field",

@@ -1,16 +1,16 @@
 """Define the errors a user can cause, as one tree.
 
-ToonsetError            exit code 2: bad input or usage, one line says where, what, and what to do
-|- CameraError          a camera that cannot exist
-|- PictureError         an image file that cannot be read or is not supported
-|- SheetError           a picture without usable figures
-|- MeshError            a mesh file that cannot be read or is not a surface
-|- LandmarkError        a landmark file that cannot be read, or landmarks without a camera
-|- BundleError          a bundle or transforms.json folder that is broken
-|- PaletteError         palette colours that cannot be used
-|- OutputError          a place that cannot be written
-|- UsageError          arguments that contradict each other
-|- SetupError           a missing system library; the message holds the install line
+    ToonsetError            exit code 2: bad input or usage; one line says where, what, what to do
+    |- CameraError          a camera that cannot exist
+    |- PictureError         an image file that cannot be read or is not supported
+    |- SheetError           a picture without usable figures
+    |- MeshError            a mesh file that cannot be read or is not a surface
+    |- LandmarkError        a landmark file that cannot be read, or landmarks without a camera
+    |- BundleError          a bundle or transforms.json folder that is broken
+    |- PaletteError         palette colours that cannot be used
+    |- OutputError          a place that cannot be written
+    |- UsageError          arguments that contradict each other
+    |- SetupError           a missing system library; the message holds the install line
 
 Numeric doubt is never an exception: it is returned as data (verdicts, probabilities, residuals).
 Foreign text in messages (a file's content, a name) is shown on one printable line.

@@ -38,6 +38,7 @@ class Job:
     mesh: Mesh | None
     text: bool
     old_layout: bool
+    pinholes: bool
     force: bool
 
 
@@ -51,6 +52,7 @@ class Target:
         takes: what of a job it takes besides folder, views, mesh and force.
         fixed: arguments that make it this format.
         is_exact: whether it holds orthographic cameras.
+        takes_one_kind: whether it does where all are, and pinholes are not asked for.
         hint: what a person should know before the next step, or type for it; {out} is the folder.
     """
 
@@ -59,12 +61,18 @@ class Target:
     takes: tuple[str, ...] = ()
     fixed: Mapping[str, bool] = field(default_factory=dict)
     is_exact: bool = False
+    takes_one_kind: bool = False
     hint: str = ""
 
     @property
     def wants_points(self) -> bool:
         """Return whether coloured points of the mannequin are part of it."""
         return "points" in self.takes
+
+    def holds_exactly(self, job: Job) -> bool:
+        """Return whether orthographic views stay orthographic."""
+        alike = all(view.camera.is_orthographic for view in job.views)
+        return self.is_exact or (self.takes_one_kind and alike and not job.pinholes)
 
     def write(self, job: Job) -> Sequence[ExportView]:
         """Write it; return the views as they were written."""
@@ -82,7 +90,8 @@ TARGETS = {
     Format.nerfstudio: Target(
         "nerfstudio:write_transforms",
         (*BESIDE, "transforms.json", "sparse_pc.ply"),
-        takes=("points",),
+        takes=("points", "pinholes"),
+        takes_one_kind=True,
         hint="to keep world and cameras, and to train and evaluate on all views: ns-train nerfacto "
         "--pipeline.model.camera-optimizer.mode off nerfstudio-data --data {out} "
         "--orientation-method none --center-method none --auto-scale-poses False --eval-mode all",

@@ -116,7 +116,7 @@ def read_labels(root: Path, frame: PosedPicture, colors: int) -> Labels | None:
         return None
     labels = load_indexed_png(file)
     check_size(file, labels, frame.camera, "transforms.json")
-    _check_paints(file, labels, colors, "label")
+    check_paints(file, labels, colors, "label")
     return labels
 
 
@@ -156,11 +156,16 @@ def read_coverage(
         return None
     ranks = load_rgba(file)[..., :3]
     check_size(file, ranks, frame.camera, "transforms.json")
-    _check_paints(file, ranks[..., :2], colors, "paint")
+    check_paints(file, ranks[..., :2], colors, "paint")
     return ranks
 
 
-def _check_paints(file: Path, paints: UInt8[np.ndarray, ...], colors: int, what: str) -> None:
+def check_paints(file: Path, paints: UInt8[np.ndarray, ...], colors: int, what: str) -> None:
+    """Refuse numbers of paints that the palette lacks.
+
+    Raises:
+        BundleError: one is as large as the palette, and not 255.
+    """
     used = paints[paints != UNLABELLED]
     if used.size and used.max() >= colors:
         raise BundleError(

@@ -14,9 +14,8 @@ from typing import Any
 from toonset import frames as conventions
 from toonset.camera import Camera
 from toonset.dataset.bundle.camera_record import NativeCamera
+from toonset.dataset.bundle.transforms_camera import FAR_HEIGHTS
 from toonset.dataset.bundle.transforms_schema import SCHEMA, VERSION
-
-FAR_HEIGHTS = 100.0  # body heights to the far pinhole that stands for an orthographic view
 
 
 def transforms_dict(

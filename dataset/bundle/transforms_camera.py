@@ -15,6 +15,8 @@ from toonset.dataset.bundle.transforms_schema import FrameRecord, Intrinsics
 from toonset.dataset.images.picture import picture_size
 from toonset.errors import BundleError
 
+FAR_HEIGHTS = 100.0  # body heights to the far pinhole that stands for an orthographic view
+ORTHOGRAPHIC = "ORTHOPHOTO"  # as nerfstudio calls it: fl_x and fl_y are pixels per world unit
 PINHOLES = ("", "PINHOLE", "SIMPLE_PINHOLE")
 BENT_PINHOLES = ("OPENCV", "FULL_OPENCV", "RADIAL", "SIMPLE_RADIAL")  # pinholes where all k are 0
 SAME_VIEW_PX = 0.5  # a pinhole may differ this much from the exact camera beside it
@@ -23,7 +25,7 @@ NO_BEND = 1e-9  # of a coefficient: moves no pixel by a thousandth
 
 
 def camera_of(defaults: Intrinsics, frame: FrameRecord, picture: Path | None) -> Camera:
-    """Return a frame's camera: the exact one where it has one, else its pinhole.
+    """Return a frame's camera: the exact one where it has one, else what its other keys say.
 
     Args:
         defaults: what the file says for all frames.
@@ -33,7 +35,7 @@ def camera_of(defaults: Intrinsics, frame: FrameRecord, picture: Path | None) ->
     Raises:
         CameraError, BundleError: no camera, or none that can be honoured.
     """
-    camera = _pinhole_of(defaults, frame, picture)
+    camera = _told_camera(defaults, frame, picture)
     if frame.toonset is None:
         check_range(camera)
         return camera
@@ -65,14 +67,27 @@ def shows_same_view(native: Camera, pinhole: Camera, error_px: float) -> bool:
     return bool(np.nan_to_num(off, nan=np.inf).max() <= error_px + SAME_VIEW_PX)
 
 
-def _pinhole_of(defaults: Intrinsics, frame: FrameRecord, picture: Path | None) -> Camera:
+def far_pinhole_of(camera: Camera, frame: FrameRecord) -> tuple[float, float]:
+    """Return how far away an orthographic camera's pinhole is, and the bound of its error in px.
+
+    The file says both; where it has no pinhole, for its cameras are orthographic themselves, the
+    figure is taken to be as tall as its picture.
+    """
+    if frame.toonset is None:
+        height = camera.size_wh[1] / float(camera.scale_uv[1])
+        return FAR_HEIGHTS * height, camera.pinhole_error_px(FAR_HEIGHTS * height, height / 2)
+    centre = conventions.opencv_pose_from_opengl(np.array(frame.transform_matrix))[:3, 3]
+    return float(camera.rotation[2] @ (camera.target - centre)), frame.toonset.pinhole_error_px
+
+
+def _told_camera(defaults: Intrinsics, frame: FrameRecord, picture: Path | None) -> Camera:
     _refuse_distortion(defaults, frame)
     values = {
         name: getattr(frame, name) if getattr(frame, name) is not None else getattr(defaults, name)
         for name in Intrinsics.model_fields
     }
     model = (values["camera_model"] or "").upper()
-    if model not in (*PINHOLES, *BENT_PINHOLES):
+    if model not in (*PINHOLES, *BENT_PINHOLES, ORTHOGRAPHIC):
         raise BundleError(
             f"camera_model {values['camera_model'][:40]!r} is not supported; undistort to PINHOLE"
         )
@@ -87,8 +102,13 @@ def _pinhole_of(defaults: Intrinsics, frame: FrameRecord, picture: Path | None) 
     cx = size[0] / 2 if values["cx"] is None else values["cx"]
     cy = size[1] / 2 if values["cy"] is None else values["cy"]
     check_numbers([fx, fy, 1 / fx, 1 / fy, cx, cy])
+    pose = conventions.opencv_pose_from_opengl(matrix)
+    if model == ORTHOGRAPHIC:  # the target is at the world origin's depth, as that of a pinhole
+        forward, plane = pose[:3, 2], pose[:3, 3]
+        target = plane - (plane @ forward) * forward
+        return Camera(pose[:3, :3].T, target, fx, np.array([cx, cy]), size, 0.0, fy / fx)
     K = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]])
-    return Camera.from_pinhole(conventions.opencv_pose_from_opengl(matrix), K, size)
+    return Camera.from_pinhole(pose, K, size)
 
 
 def _refuse_distortion(*records: Intrinsics) -> None:

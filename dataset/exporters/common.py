@@ -20,16 +20,16 @@ from typing import Any
 import numpy as np
 from jaxtyping import UInt8
 
-from toonset import frames as conventions
 from toonset.camera import Camera
 from toonset.dataset.bundle.camera_record import NativeCamera
 from toonset.dataset.bundle.read_scene import MANNEQUIN, read_scene
 from toonset.dataset.bundle.scene import Frame
+from toonset.dataset.bundle.transforms_camera import far_pinhole_of
 from toonset.dataset.bundle.transforms_read import transforms_file
+from toonset.dataset.bundle.transforms_schema import FrameRecord, read_records
 from toonset.dataset.images.picture import encode_png
 from toonset.dataset.mesh.load import save_obj
 from toonset.errors import BundleError
-from toonset.json_file import read_json
 from toonset.mesh import Mesh
 from toonset.write import write_bytes, write_json
 
@@ -79,7 +79,7 @@ def read_views(bundle: Path) -> tuple[ExportView, ...]:
         PictureError: a picture cannot be read.
     """
     scene = read_scene(bundle)
-    records = read_json(transforms_file(bundle))["frames"]
+    records = read_records(transforms_file(bundle)).frames
     pairs = zip(scene.frames, records, strict=True)
     views = tuple(_view(frame, record) for frame, record in pairs)
     names = [view.name for view in views]
@@ -138,15 +138,14 @@ def write_beside(
         write_bytes(folder / MANNEQUIN, save_obj(mesh))
 
 
-def _view(frame: Frame, record: dict[str, Any]) -> ExportView:
+def _view(frame: Frame, record: FrameRecord) -> ExportView:
     camera, name = frame.camera, f"{Path(frame.name).stem}.png"
     if not camera.is_orthographic:
         return ExportView(name, frame.rgba, camera, 1 / camera.k, 0.0)
-    matrix = np.array(record["transform_matrix"], dtype=np.float64)
-    centre = conventions.opencv_pose_from_opengl(matrix)[:3, 3]
-    distance = float(camera.rotation[2] @ (camera.target - centre))
-    radius = _covered_radius(camera, distance, float(record["toonset"]["pinhole_error_px"]))
-    return ExportView(name, frame.rgba, camera, distance, radius)
+    distance, error_px = far_pinhole_of(camera, record)
+    return ExportView(
+        name, frame.rgba, camera, distance, _covered_radius(camera, distance, error_px)
+    )
 
 
 def _covered_radius(camera: Camera, distance: float, error_px: float) -> float:

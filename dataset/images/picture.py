@@ -88,7 +88,17 @@ def load_indexed_png(path: Path, max_pixels: int = MAX_PIXELS) -> UInt8[np.ndarr
     Raises:
         PictureError: as `load_rgba`, or the picture has no palette.
     """
-    data = read_whole(path, "picture", PictureError)
+    return decode_indexed_png(read_whole(path, "picture", PictureError), path, max_pixels)
+
+
+def decode_indexed_png(
+    data: bytes, path: Path, max_pixels: int = MAX_PIXELS
+) -> UInt8[np.ndarray, "height width"]:
+    """Return `load_indexed_png` of bytes that came from `path`.
+
+    Raises:
+        PictureError: as `load_indexed_png`.
+    """
     with _opened(data, path, max_pixels) as image:
         if image.format != "PNG" or image.mode != "P":
             raise PictureError(

@@ -10,7 +10,8 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.dataset.bundle.read_scene import MANNEQUIN
-from toonset.dataset.bundle.transforms import FAR_HEIGHTS, transforms_dict
+from toonset.dataset.bundle.transforms import transforms_dict
+from toonset.dataset.bundle.transforms_camera import FAR_HEIGHTS
 from toonset.dataset.bundle.transforms_read import check_total
 from toonset.dataset.exporters.common import NATIVE
 from toonset.dataset.images.picture import encode_png, load_rgba
@@ -89,7 +90,11 @@ def _body(imported: Imported, mesh: Mesh | None) -> tuple[float, float]:
     """Return height and radius for the far pinholes of orthographic views."""
     if imported.native is not None:
         return imported.native.far_distance / FAR_HEIGHTS, imported.native.radius
-    return (1.0, 1.0) if mesh is None else (mesh.height, mesh.radius)
+    if mesh is not None:
+        return mesh.height, mesh.radius
+    cameras = [view.camera for view in imported.views if view.camera.is_orthographic]
+    height = max((c.size_wh[1] / float(c.scale_uv[1]) for c in cameras), default=1.0)
+    return height, height / 2
 
 
 def _picture(view: ImportView) -> tuple[UInt8[np.ndarray, "height width 4"], tuple[str, ...]]:

@@ -15,7 +15,7 @@ shape, type and value before use.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,12 +25,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from safetensors.torch import save
 
 from toonset.dataset.bundle.camera_record import LARGEST
-from toonset.errors import BundleError
+from toonset.errors import BundleError, UsageError
 from toonset.json_file import read_json, validation_reason
 from toonset.nerf.fields.classifier import PaletteClassifier
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.fields.triplane import TriplaneField
 from toonset.nerf.hull.hull import Hull
+from toonset.nerf.options import TrainOptions
 from toonset.nerf.run.drawings import (
     ORIGINALS,
     PAINT,
@@ -156,6 +157,26 @@ def read_field(folder: str | Path) -> TrainedField:
     if record.drawings is None:
         return trained
     return replace(trained, drawings=read_drawings(folder, record.drawings))
+
+
+def read_options(folder: Path) -> TrainOptions:
+    """Return the options that a run was trained with.
+
+    Raises:
+        BundleError: config.json is missing or damaged, or has options that no training takes.
+    """
+    file = folder / CONFIG
+    content = read_json(file)
+    said = content.get("options") if isinstance(content, dict) else None
+    known = {each.name for each in fields(TrainOptions)}
+    if not isinstance(said, dict) or set(said) != known:
+        raise BundleError(f"{file}: its options are not those of this toonset; train again")
+    try:
+        options = TrainOptions(**said)
+        options.check()
+    except UsageError as error:
+        raise BundleError(f"{file}: options: {error}; train again") from error
+    return options
 
 
 def _record(file: Path) -> FieldRecord:

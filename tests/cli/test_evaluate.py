@@ -2,12 +2,14 @@
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
+import toonset as ts
 from toonset.camera import Camera
 from toonset.dataset.bundle.read_scene import read_scene
 from toonset.dataset.bundle.scene import Frame, Scene
@@ -176,3 +178,40 @@ def test_a_picture_shows_the_worst_of_many_views() -> None:
     assert sheet.shape[0] == HEADING_PX + 12 * (TILE_PX + CAPTION_PX)
     odd = contact_sheet([("a", views[:3]), ("b", views[:1])], "FLIP")
     assert odd.shape == (2 * HEADING_PX + 3 * (TILE_PX + CAPTION_PX), sheet.shape[1], 3)
+
+
+def test_each_drawing_left_out(bundle: Path, trained, toonset, tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    scene = read_scene(bundle)
+    kept = replace(scene, frames=scene.frames[:3])
+    options = ts.TrainOptions(steps=3, device="cpu", mannequin=False)
+    ts.train(kept, options).save(bundle / "run")
+    done = toonset("evaluate", "bundle/run", "--leave-one-out", "--json", "-o", "judged")
+    assert done.code == 0
+    found = json.loads((tmp_path / "judged" / "evaluation.json").read_text())
+    assert found == done.json
+    assert found == json.loads(json.dumps(ts.leave_one_out(kept, options).to_json()))
+    assert [len(view["trained_on"]) for view in found["leave_one_out"]["views"]] == [2, 2, 2]
+    assert (tmp_path / "judged" / "evaluation.png").is_file()
+
+
+@pytest.mark.parametrize(
+    ("flags", "reason"),
+    [
+        ((), "give --test with held-out views, or --leave-one-out"),
+        (("--leave-one-out", "--test", "bundle"), "give --test with held-out views"),
+        (("--leave-one-out",), "holds no transforms.json; pass --bundle"),
+    ],
+)
+def test_left_out_of_what(flags, reason, run: Path, toonset) -> None:
+    assert reason in toonset("evaluate", run, *flags).reason
+
+
+def test_left_out_with_options_that_no_run_has(bundle: Path, run: Path, toonset) -> None:
+    config = json.loads((run / "config.json").read_text())
+    for changed in ({"steps": 0}, {"brightness": 1}):
+        content = {**config, "options": {**config["options"], **changed}}
+        (run / "config.json").write_text(json.dumps(content))
+        done = toonset("evaluate", run, "--leave-one-out", "--bundle", bundle)
+        assert "config.json" in done.reason
+        assert "train again" in done.reason

@@ -7,6 +7,7 @@ else comes out is a defect of the reader.
 from __future__ import annotations
 
 import contextlib
+import json
 import struct
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -26,6 +27,7 @@ from toonset.dataset.split.sheet import SheetOptions, split_picture
 from toonset.dataset.split_folder.boxes import read_boxes
 from toonset.dataset.split_folder.corrections import read_corrections
 from toonset.dataset.split_folder.write import read_records
+from toonset.dataset.view_dataset import ViewDataset
 from toonset.errors import ToonsetError
 from toonset.palette.formats.json import read_palette_json
 from toonset.palette.formats.registry import names_tones, palette_names, parse_colors
@@ -118,6 +120,18 @@ def _write(file: Path, data: bytes | None) -> None:
         file.write_bytes(data)
 
 
+def data_set(kind: str, name: str, listed: str) -> Target:
+    """Return a target that reads a data set of one view, as a card lists it, with its picture."""
+    files = [{"name": listed, "views": 1}]
+    card = {"schema": "toonset-dataset/1", "format": kind, "splits": {"train": {"files": files}}}
+
+    def read(path: Path) -> None:
+        _write(path.with_name("card.json"), json.dumps(card).encode())
+        ViewDataset(path.parent)[0]
+
+    return file_of(name, read)
+
+
 def in_folder(read: Reader) -> Reader:
     """Return a reader of a file's folder."""
     return lambda file: read(file.parent)
@@ -146,6 +160,9 @@ def _targets() -> Iterator[tuple[str, Target]]:
     yield "corrections.json", file_of("a.json", read_corrections)
     for kind in ("csv", "jsonl"):
         yield f"manifest.{kind}", file_of(f"a.{kind}", lambda file: list_sheets([str(file)], {}))
+    yield "data.tar", data_set("webdataset", "a.tar", "a.tar")
+    yield "data.parquet", data_set("parquet", "a.parquet", "a.parquet")
+    yield "data.jsonl", data_set("folder", "metadata.jsonl", ".")
 
 
 COLORS: tuple[Reader, ...] = (

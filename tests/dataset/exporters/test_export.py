@@ -5,11 +5,13 @@ import math
 import shlex
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import trimesh
 
+import toonset as ts
 from tests.dataset.exporters.exported_views import (
     MODELS,
     RADIUS,
@@ -116,8 +118,9 @@ def test_square_pixels_enlarge_the_shorter_direction() -> None:
 @pytest.mark.parametrize("instant_ngp", [False, True])
 def test_transforms_hold_every_lens(tmp_path: Path, k: float, instant_ngp: bool) -> None:
     views = views_all_round(k=k)
-    write_transforms(tmp_path / "out", views, instant_ngp=instant_ngp)
+    write_transforms(tmp_path / "out", views, instant_ngp=instant_ngp, pinholes=not instant_ngp)
     content = json.loads((tmp_path / "out" / "transforms.json").read_text())
+    assert content["camera_model"] == "OPENCV"
     for frame, view in zip(content["frames"], views, strict=True):
         focal = (frame["fl_x"], frame["fl_y"])
         center = np.array([frame["cx"], frame["cy"]])
@@ -128,6 +131,69 @@ def test_transforms_hold_every_lens(tmp_path: Path, k: float, instant_ngp: bool)
         np.testing.assert_array_equal(picture, view.rgba)
         assert picture.shape == (frame["h"], frame["w"], 4)
         assert "mask_path" not in frame  # it would hide the empty background from training
+
+
+def parallel_ray(frame: dict[str, Any], pixel: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return start and direction as nerfstudio 1.1.5 has them of its ORTHOPHOTO, in float32."""
+    pose = np.array(frame["transform_matrix"], np.float32)[:3]
+    u, v = pixel.astype(np.float32)
+    x = (u - np.float32(frame["cx"])) / np.float32(frame["fl_x"])
+    y = (v - np.float32(frame["cy"])) / np.float32(frame["fl_y"])
+    start = pose @ np.array([x, -y, 0, 1], np.float32)
+    return start, pose[:, :3] @ np.array([0, 0, -1], np.float32)
+
+
+@pytest.mark.parametrize("aspect", [1.0, 1.25])
+def test_nerfstudio_sees_orthographic_views_as_such(tmp_path: Path, aspect: float) -> None:
+    views = views_all_round(aspect=aspect)
+    write_transforms(tmp_path / "out", views)
+    content = json.loads((tmp_path / "out" / "transforms.json").read_text())
+    assert content["camera_model"] == "ORTHOPHOTO"
+    for frame, view in zip(content["frames"], views, strict=True):
+        points = around(view.camera.target)
+        for point, pixel in zip(points, view.camera.project(points)[0], strict=True):
+            start, direction = parallel_ray(frame, pixel)
+            along = (point - start) @ direction
+            assert along > 0.05  # nerfacto's near plane
+            assert np.linalg.norm(point - start - along * direction) < 1e-5
+        picture = load_rgba(tmp_path / "out" / frame["file_path"])
+        np.testing.assert_array_equal(picture, view.rgba)
+
+
+def test_one_model_holds_for_all_frames_of_nerfstudio(tmp_path: Path) -> None:
+    mixed = (*views_all_round(2), replace(views_all_round(1, k=0.2)[0], name="other.png"))
+    write_transforms(tmp_path / "out", mixed)
+    content = json.loads((tmp_path / "out" / "transforms.json").read_text())
+    assert content["camera_model"] == "OPENCV"
+    for frame, view in zip(content["frames"], mixed, strict=True):
+        pose, center = np.array(frame["transform_matrix"]), np.array([frame["cx"], frame["cy"]])
+        pixels = through(pose, (frame["fl_x"], frame["fl_y"]), center)
+        assert off_px(pixels, view.pinhole) < 1e-6
+
+
+@pytest.mark.parametrize("aspect", [1.0, 1.25])
+def test_orthographic_frames_of_another_program_are_read_and_written(
+    tmp_path: Path, aspect: float, toonset
+) -> None:
+    views = views_all_round(4, aspect=aspect)
+    write_transforms(tmp_path / "out", views)
+    (tmp_path / "out" / "toonset.json").unlink()  # nobody says more than transforms.json
+    for read, view in zip(read_views(tmp_path / "out"), views, strict=True):
+        assert read.camera.is_orthographic
+        assert read.radius > 0.9 * RADIUS
+        points = read.camera.target + read.radius * around(np.zeros(3))
+        seen = read.camera.project(points)[0]
+        np.testing.assert_allclose(seen, view.camera.project(points)[0], atol=1e-9)
+        off = read.pinhole.project(points)[0] - seen
+        assert 0 < np.linalg.norm(off, axis=1).max() <= read.error_px
+    done = toonset("import", tmp_path / "out", "-o", tmp_path / "bundle")
+    assert done.code == 0, done
+    for item, view in zip(ts.ViewDataset(tmp_path / "bundle"), views, strict=True):
+        exact = np.column_stack([around(TARGET), np.ones(len(around(TARGET)))])
+        u, v, w = item["image_from_world"].numpy() @ exact.T
+        assert off_px(np.stack([u / w, v / w], axis=1), view.camera) < 1e-9
+    items = ts.ViewDataset(tmp_path / "out")
+    assert all(item["orthographic"] and item["pinhole_error_px"] > 0 for item in items)
 
 
 @MODELS
@@ -202,7 +268,7 @@ def test_every_format_is_written_whole_and_replaced_only_by_force(toonset, tmp_p
     first = toonset("export", bundle, "--to", to, "-o", out, "--json")
     assert first.code == 0, first
     assert first.json["views"] == 3
-    assert (first.json["pinhole_error_px"] == 0) == (to in ("blender", "gltf"))
+    assert (first.json["pinhole_error_px"] == 0) == (to in ("blender", "gltf", "nerfstudio"))
     before = {path.name for path in out.iterdir()}
     assert {"toonset.json", "mannequin.obj"} < before
     assert "exists already" in toonset("export", bundle, "--to", to, "-o", out).reason
@@ -228,6 +294,18 @@ def test_the_nerfstudio_line_has_pictures_to_evaluate_on(toonset, tmp_path: Path
         "--auto-scale-poses": "False",
         "--eval-mode": "all",
     }
+
+
+def test_splatfacto_gets_far_pinholes(toonset, tmp_path: Path) -> None:
+    bundle, out = bundle_of(views_all_round(3), tmp_path / "bundle", egg()), tmp_path / "out"
+    said = toonset("export", bundle, "--to", "nerfstudio", "-o", out)
+    assert "orthographic (ORTHOPHOTO); for splatfacto, which knows none, add --pinholes" in said.err
+    again = toonset("export", bundle, "--to", "nerfstudio", "-o", out, "--pinholes", "--force")
+    assert "3 orthographic, written as far pinholes: at most " in again.err
+    assert json.loads((out / "transforms.json").read_text())["camera_model"] == "OPENCV"
+    refused = toonset("export", bundle, "--to", "colmap", "-o", tmp_path / "c", "--pinholes")
+    assert refused.code == 2
+    assert "--pinholes belongs to --to nerfstudio" in " ".join(refused.err.split())
 
 
 def test_options_of_colmap_are_refused_elsewhere(toonset, tmp_path: Path) -> None:

@@ -23,6 +23,9 @@ WRITERS: dict[str, Writer] = {
     "colmap-old": lambda out, views, mesh: write_colmap(out, views, None, mesh, old_layout=True),
     "colmap-text": lambda out, views, mesh: write_colmap(out, views, None, mesh, text=True),
     "nerfstudio": lambda out, views, mesh: write_transforms(out, views, None, mesh),
+    "nerfstudio-pinholes": lambda out, views, mesh: write_transforms(
+        out, views, None, mesh, pinholes=True
+    ),
     "instant-ngp": lambda out, views, mesh: write_transforms(
         out, views, None, mesh, instant_ngp=True
     ),
