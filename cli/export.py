@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from toonset.dataset.exporters.points import TrackedPoints
     from toonset.mesh import Mesh
 
-COLMAP_PANEL = "COLMAP"
+COLMAP_PANEL, BLENDER_PANEL = "COLMAP", "Blender"
+NO_BODY, GLB = "none", b"glTF"
 ASTRAY_PX = 0.1  # a principal point is worth a word from here
 
 
@@ -63,6 +64,16 @@ def export(
             rich_help_panel=COLMAP_PANEL,
         ),
     ] = False,
+    body: Annotated[
+        str | None,
+        typer.Option(
+            "--body",
+            metavar="GLB|none",
+            help="The painted body (default: the bundle's run as `toonset mesh --texture` writes "
+            "it).",
+            rich_help_panel=BLENDER_PANEL,
+        ),
+    ] = None,
     force: ForceFlag = False,
     seed: SeedOption = 0,
     as_json: JsonFlag = False,
@@ -75,6 +86,8 @@ def export(
     """
     if to != Format.colmap and (text or centre or layout != "new"):
         raise typer.BadParameter("--text, --layout and --centre belong to --to colmap")
+    if to != Format.blender and body is not None:
+        raise typer.BadParameter("--body belongs to --to blender")
     from toonset.dataset.bundle.bundle import mannequin_of
     from toonset.dataset.bundle.transforms_read import transforms_file
     from toonset.dataset.exporters.common import read_views
@@ -82,18 +95,48 @@ def export(
 
     printer, target = Printer(as_json, quiet), TARGETS[to]
     views = read_views(bundle)
-    body = mannequin_of(transforms_file(bundle).parent, mesh, up=up)
+    root = transforms_file(bundle).parent
+    mannequin = mannequin_of(root, mesh, up=up)
     check_output(out, [bundle, mesh], target.written, force=force)
+    painted = _painted_body(root, body, printer) if to == Format.blender else None
     if centre:
         views = tuple(centre_view(view) for view in views)
     points = None
     if target.wants_points:
         printer.progress("colouring points")
-        points = _points(body, views, seed, is_given=mesh is not None)
-    job = Job(out, views, points, body, text, layout == "old", force)
-    for remark in () if mesh is None or body is None else body.remarks:
+        points = _points(mannequin, views, seed, is_given=mesh is not None)
+    job = Job(out, views, points, mannequin, painted, text, layout == "old", force)
+    for remark in () if mesh is None or mannequin is None else mannequin.remarks:
         printer.say(remark)
     _report(printer, to, job, target.write(job))
+
+
+def _painted_body(bundle: Path, given: str | None, printer: Printer) -> bytes | None:
+    """Return the GLB of a painted body: a file that was named, or the bundle's run as a mesh."""
+    from toonset.errors import MeshError, ToonsetError
+    from toonset.read import read_whole
+
+    if given is not None and given != NO_BODY:
+        data = read_whole(Path(given), "mesh", MeshError)
+        if not data.startswith(GLB):
+            raise MeshError(f"{given}: is no GLB; give what `toonset mesh --texture` writes")
+        return data
+    run = bundle / "run"
+    if given == NO_BODY or not (run / "config.json").is_file():
+        return None
+    from toonset.nerf.run.folder import read_field
+    from toonset.nerf.surface.texture import texture_surface
+    from toonset.nerf.surface.textured_files import encode_textured_glb
+
+    def progress(step: str, done: float) -> None:
+        printer.progress(f"{step} {done:.0%}")
+
+    trained = read_field(run)
+    try:
+        return encode_textured_glb(texture_surface(trained, progress=progress))
+    except ToonsetError as error:
+        printer.say(f"no painted body: {error}")
+        return None
 
 
 def _points(

@@ -33,7 +33,7 @@ AUTO = "auto"
 PLANNED_AT_ONCE = 500  # sheets of one transaction
 
 
-def more_stages(incomplete: str) -> list[str]:
+def _like(incomplete: str) -> list[str]:
     """Return what a list of stages that is being typed may become."""
     from toonset.cli.batch.stages import STAGES
 
@@ -60,7 +60,7 @@ def batch(
         typer.Option(
             "--stages",
             help="Of calibrate, palette, train, render, view, mesh, export.",
-            autocompletion=more_stages,
+            autocompletion=_like,
         ),
     ] = USUAL,
     given: Annotated[

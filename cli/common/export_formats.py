@@ -36,6 +36,7 @@ class Job:
     views: Sequence[ExportView]
     points: TrackedPoints | None
     mesh: Mesh | None
+    body: bytes | None
     text: bool
     old_layout: bool
     force: bool
@@ -98,7 +99,8 @@ TARGETS = {
     ),
     Format.blender: Target(
         "blender:write_blender_script",
-        (*BESIDE, "import_cameras.py", "scene.glb"),
+        (*BESIDE, "import_cameras.py", "scene.glb", "body.glb"),
+        takes=("body",),
         is_exact=True,
         hint="run it: blender --python {out}/import_cameras.py",
     ),

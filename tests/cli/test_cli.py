@@ -53,23 +53,6 @@ def test_help_of_every_verb_imports_nothing_heavy():
     assert not modules & heavy
 
 
-def test_zsh_completes_at_the_first_tab_too(monkeypatch, shell):
-    monkeypatch.setenv("_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION", "1")
-    lines = shell("--show-completion", "zsh").out.split("\n")
-    says = lines.index("compdef _toonset_completion toonset")
-    loaded = lines.index("if [[ $zsh_eval_context[-1] == loadautofunc ]]; then")
-    assert loaded > says
-    assert lines[loaded + 1].split() == ["_toonset_completion", '"$@"']
-
-
-def test_a_list_of_stages_is_completed(monkeypatch, shell):
-    monkeypatch.setenv("_TOONSET_COMPLETE", "complete_zsh")
-    monkeypatch.setenv("_TYPER_COMPLETE_ARGS", "toonset batch --stages palette,calibrate,p")
-    assert "palette" not in shell().out
-    monkeypatch.setenv("_TYPER_COMPLETE_ARGS", "toonset batch --stages calibrate,p")
-    assert '"calibrate,palette"' in shell().out
-
-
 def test_no_arguments_show_the_help_and_a_wrong_verb_the_right_one(shell):
     bare = shell()
     assert bare.code == 2
