@@ -10,8 +10,8 @@ camera must not be in the way; its planes are shown first, and its turning camer
 yaw of its frame. Measured with Blender 5.2.3 LTS (3 bundles, 22 views, perspective and
 orthographic): at most 0.0004 px for points and corners, script and glTF alike; since the script
 opens a GLB itself, with Blender 4.5.15 LTS (2 bundles, 24 views) 0.0003.
-With a painted body and the turn (1 bundle, 8 views): 0.0003 with Debian's 3.4.1, 4.2.23 LTS and 5.0.1.
-A Blender of the system runs it, too:
+With a painted body and the turn (1 bundle, 8 views): 0.0003 with Debian's 3.4.1, 4.2.23 LTS and
+5.0.1. A Blender of the system runs it, too:
 
     PYTHONPATH=tests/consumers blender -b --factory-startup --python-use-system-env \\
         --python tests/consumers/check_blender.py -- a b
