@@ -32,13 +32,20 @@ ASTRAY_PX = 0.1  # a principal point is worth a word from here
 
 
 def export(
-    bundle: Annotated[
-        Path, typer.Argument(metavar="BUNDLE", help="A bundle, or a folder with transforms.json.")
-    ],
     to: Annotated[Format, typer.Option("--to", help="Format.")],
     out: Annotated[
-        Path, typer.Option("-o", "--out", help="Folder to write.", rich_help_panel=OUTPUT_PANEL)
+        Path,
+        typer.Option(
+            "-o", "--out", help="Folder to write; the add-on's .zip.", rich_help_panel=OUTPUT_PANEL
+        ),
     ],
+    bundle: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="BUNDLE",
+            help="A bundle, or a folder with transforms.json; none for the add-on.",
+        ),
+    ] = None,
     mesh: Annotated[
         Path | None, typer.Option("--mesh", help="The mannequin (default: the bundle's own).")
     ] = None,
@@ -83,17 +90,27 @@ def export(
 
     Where a format has no orthographic camera, such views become pinholes 100 body heights away, and
     how far these may be off is printed. The exact cameras are in toonset.json.
+
+    blender-addon is a panel for Blender's 3D view that runs this command: sheet, cameras, a compass
+    for every drawing. Preferences > Add-ons > Install takes the zip; tell it where `toonset` is.
     """
     if to != Format.colmap and (text or centre or layout != "new"):
         raise typer.BadParameter("--text, --layout and --centre belong to --to colmap")
     if to != Format.blender and body is not None:
         raise typer.BadParameter("--body belongs to --to blender")
+    printer = Printer(as_json, quiet)
+    if to == Format.blender_addon:
+        if bundle is not None or mesh is not None:
+            raise typer.BadParameter("the add-on is of no bundle: leave out BUNDLE and --mesh")
+        return _write_addon(printer, out, force=force)
+    if bundle is None:
+        raise typer.BadParameter(f"--to {to.value} needs a BUNDLE")
     from toonset.dataset.bundle.bundle import mannequin_of
     from toonset.dataset.bundle.transforms_read import transforms_file
     from toonset.dataset.exporters.common import read_views
     from toonset.dataset.exporters.pinhole import centre_view
 
-    printer, target = Printer(as_json, quiet), TARGETS[to]
+    target = TARGETS[to]
     views = read_views(bundle)
     root = transforms_file(bundle).parent
     mannequin = mannequin_of(root, mesh, up=up)
@@ -109,6 +126,19 @@ def export(
     for remark in () if mesh is None or mannequin is None else mannequin.remarks:
         printer.say(remark)
     _report(printer, to, job, target.write(job))
+
+
+def _write_addon(printer: Printer, out: Path, *, force: bool) -> None:
+    from toonset.dataset.exporters.blender_addon import write_blender_addon
+    from toonset.errors import OutputError
+    from toonset.write import check_new_file
+
+    if out.suffix.lower() != ".zip":
+        raise OutputError(f"{out}: Blender installs a .zip; end -o in .zip")
+    check_new_file(out, force=force)
+    write_blender_addon(out)
+    printer.say("in Blender: Preferences > Add-ons > Install (from Disk); then 3D View > Sidebar")
+    printer.result({"out": out, "format": Format.blender_addon.value}, str(out))
 
 
 def _painted_body(bundle: Path, given: str | None, printer: Printer) -> bytes | None:

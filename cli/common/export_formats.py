@@ -25,6 +25,7 @@ class Format(StrEnum):
     instant_ngp = "instant-ngp"
     blender_synthetic = "blender-synthetic"
     blender = "blender"
+    blender_addon = "blender-addon"
     gltf = "gltf"
 
 

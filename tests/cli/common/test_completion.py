@@ -68,7 +68,7 @@ def test_options_are_completed(completed: Callable[[str], set[str]]) -> None:
     [
         ("batch --stages calibrate,p", {"calibrate,palette"}),
         ("batch --stages r", {"render"}),
-        ("export bundle --to b", {"blender", "blender-synthetic"}),
+        ("export bundle --to b", {"blender", "blender-addon", "blender-synthetic"}),
         ("export bundle --to colmap --layout ", {"new", "old"}),
         ("render run --layer normal", {"normal", "normal-camera"}),
         ("render run --format webp,s", {"webp,sprites", "webp,svg"}),
