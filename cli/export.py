@@ -76,8 +76,7 @@ def export(
         typer.Option(
             "--body",
             metavar="GLB|none",
-            help="The painted body (default: the bundle's run as `toonset mesh --texture` writes "
-            "it).",
+            help="The painted body (default: the bundle's run, as `mesh --texture --outline`).",
             rich_help_panel=BLENDER_PANEL,
         ),
     ] = None,
@@ -162,8 +161,10 @@ def _painted_body(bundle: Path, given: str | None, printer: Printer) -> bytes | 
         printer.progress(f"{step} {done:.0%}")
 
     trained = read_field(run)
+    has_pen = trained.drawings is not None and trained.drawings.pen is not None
     try:
-        return encode_textured_glb(texture_surface(trained, progress=progress))
+        textured = texture_surface(trained, progress=progress, outline=has_pen)
+        return encode_textured_glb(textured)
     except ToonsetError as error:
         printer.say(f"no painted body: {error}")
         return None

@@ -56,6 +56,18 @@ def opened(name):
     return [thing for thing in bpy.data.objects if thing not in before and thing.type == "MESH"]
 
 
+def draw_outline(material):
+    """Let Cycles, too, see through the near side of the outline's hull, which is inside out."""
+    nodes, link = material.node_tree.nodes, material.node_tree.links.new
+    surface = next(node for node in nodes if node.type == "OUTPUT_MATERIAL").inputs["Surface"]
+    ink = surface.links[0].from_socket
+    mixed = nodes.new("ShaderNodeMixShader")
+    link(nodes.new("ShaderNodeNewGeometry").outputs["Backfacing"], mixed.inputs[0])
+    link(ink, mixed.inputs[1])
+    link(nodes.new("ShaderNodeBsdfTransparent").outputs[0], mixed.inputs[2])
+    link(mixed.outputs[0], surface)
+
+
 def camera_of(view):
     """Return a camera that sees exactly what the drawing shows."""
     lens = bpy.data.cameras.new(view["name"])
@@ -133,6 +145,9 @@ def main():
         mesh.display_type = "WIRE"
     for thing in [*body, *meshes]:
         thing.select_set(False)
+    for material in {one for mesh in body for one in mesh.data.materials if one is not None}:
+        if material.name.startswith("outline"):
+            draw_outline(material)
     collection(scene, "body", body)
     collection(scene, "mannequin", mannequin, hidden=bool(body))
     collection(scene, "drawings", planes, hidden=True)
