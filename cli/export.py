@@ -95,7 +95,7 @@ def export(
     """
     if to != Format.colmap and (text or centre or layout != "new"):
         raise typer.BadParameter("--text, --layout and --centre belong to --to colmap")
-    if to != Format.blender and body is not None:
+    if to != Format.blender and body not in (None, NO_BODY):
         raise typer.BadParameter("--body belongs to --to blender")
     printer = Printer(as_json, quiet)
     if to == Format.blender_addon:

@@ -66,7 +66,7 @@ def test_blender_gets_the_painted_body(
     for file, reason in (("no.glb", "no.glb: no such file"), ("own/mannequin.obj", "is no GLB")):
         assert reason in toonset(*asked, tmp_path / "x", "--body", tmp_path / file).reason
     assert not (tmp_path / "x").exists()
-    elsewhere = ("export", bundle, "--to", "gltf", "--body", "none", "-o", tmp_path / "x")
+    elsewhere = ("export", bundle, "--to", "gltf", "--body", given, "-o", tmp_path / "x")
     assert "--body belongs to --to blender" in toonset(*elsewhere).reason
     with monkeypatch.context() as patch:
         patch.setattr(texture, "texture_surface", without_palette)
