@@ -26,18 +26,26 @@ if TYPE_CHECKING:
     from toonset.dataset.exporters.points import TrackedPoints
     from toonset.mesh import Mesh
 
-COLMAP_PANEL, NERFSTUDIO_PANEL = "COLMAP", "nerfstudio"
+COLMAP_PANEL, NERFSTUDIO_PANEL, BLENDER_PANEL = "COLMAP", "nerfstudio", "Blender"
+NO_BODY, GLB = "none", b"glTF"
 ASTRAY_PX = 0.1  # a principal point is worth a word from here
 
 
 def export(
-    bundle: Annotated[
-        Path, typer.Argument(metavar="BUNDLE", help="A bundle, or a folder with transforms.json.")
-    ],
     to: Annotated[Format, typer.Option("--to", help="Format.")],
     out: Annotated[
-        Path, typer.Option("-o", "--out", help="Folder to write.", rich_help_panel=OUTPUT_PANEL)
+        Path,
+        typer.Option(
+            "-o", "--out", help="Folder to write; the add-on's .zip.", rich_help_panel=OUTPUT_PANEL
+        ),
     ],
+    bundle: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="BUNDLE",
+            help="A bundle, or a folder with transforms.json; none for the add-on.",
+        ),
+    ] = None,
     mesh: Annotated[
         Path | None, typer.Option("--mesh", help="The mannequin (default: the bundle's own).")
     ] = None,
@@ -71,6 +79,15 @@ def export(
             rich_help_panel=NERFSTUDIO_PANEL,
         ),
     ] = False,
+    body: Annotated[
+        str | None,
+        typer.Option(
+            "--body",
+            metavar="GLB|none",
+            help="The painted body (default: the bundle's run, as `mesh --texture --outline`).",
+            rich_help_panel=BLENDER_PANEL,
+        ),
+    ] = None,
     force: ForceFlag = False,
     seed: SeedOption = 0,
     as_json: JsonFlag = False,
@@ -80,30 +97,87 @@ def export(
 
     Where a format has no orthographic camera, such views become pinholes 100 body heights away, and
     how far these may be off is printed. The exact cameras are in toonset.json.
+
+    blender-addon is a panel for Blender's 3D view that runs this command: sheet, cameras, a compass
+    for every drawing. Preferences > Add-ons > Install takes the zip; tell it where `toonset` is.
     """
     if to != Format.colmap and (text or centre or layout != "new"):
         raise typer.BadParameter("--text, --layout and --centre belong to --to colmap")
     if to != Format.nerfstudio and pinholes:
         raise typer.BadParameter("--pinholes belongs to --to nerfstudio")
+    if to != Format.blender and body not in (None, NO_BODY):
+        raise typer.BadParameter("--body belongs to --to blender")
+    printer = Printer(as_json, quiet)
+    if to == Format.blender_addon:
+        if bundle is not None or mesh is not None:
+            raise typer.BadParameter("the add-on is of no bundle: leave out BUNDLE and --mesh")
+        return _write_addon(printer, out, force=force)
+    if bundle is None:
+        raise typer.BadParameter(f"--to {to.value} needs a BUNDLE")
     from toonset.dataset.bundle.bundle import mannequin_of
     from toonset.dataset.bundle.transforms_read import transforms_file
     from toonset.dataset.exporters.common import read_views
     from toonset.dataset.exporters.pinhole import centre_view
 
-    printer, target = Printer(as_json, quiet), TARGETS[to]
+    target = TARGETS[to]
     views = read_views(bundle)
-    body = mannequin_of(transforms_file(bundle).parent, mesh, up=up)
+    root = transforms_file(bundle).parent
+    mannequin = mannequin_of(root, mesh, up=up)
     check_output(out, [bundle, mesh], target.written, force=force)
+    painted = _painted_body(root, body, printer) if to == Format.blender else None
     if centre:
         views = tuple(centre_view(view) for view in views)
     points = None
     if target.wants_points:
         printer.progress("colouring points")
-        points = _points(body, views, seed, is_given=mesh is not None)
-    job = Job(out, views, points, body, text, layout == "old", pinholes, force)
-    for remark in () if mesh is None or body is None else body.remarks:
+        points = _points(mannequin, views, seed, is_given=mesh is not None)
+    job = Job(out, views, points, mannequin, painted, text, layout == "old", pinholes, force)
+    for remark in () if mesh is None or mannequin is None else mannequin.remarks:
         printer.say(remark)
     _report(printer, to, job, target.write(job))
+
+
+def _write_addon(printer: Printer, out: Path, *, force: bool) -> None:
+    from toonset.dataset.exporters.blender_addon import write_blender_addon
+    from toonset.errors import OutputError
+    from toonset.write import check_new_file
+
+    if out.suffix.lower() != ".zip":
+        raise OutputError(f"{out}: Blender installs a .zip; end -o in .zip")
+    check_new_file(out, force=force)
+    write_blender_addon(out)
+    printer.say("in Blender: Preferences > Add-ons > Install (from Disk); then 3D View > Sidebar")
+    printer.result({"out": out, "format": Format.blender_addon.value}, str(out))
+
+
+def _painted_body(bundle: Path, given: str | None, printer: Printer) -> bytes | None:
+    """Return the GLB of a painted body: a file that was named, or the bundle's run as a mesh."""
+    from toonset.errors import MeshError, ToonsetError
+    from toonset.read import read_whole
+
+    if given is not None and given != NO_BODY:
+        data = read_whole(Path(given), "mesh", MeshError)
+        if not data.startswith(GLB):
+            raise MeshError(f"{given}: is no GLB; give what `toonset mesh --texture` writes")
+        return data
+    run = bundle / "run"
+    if given == NO_BODY or not (run / "config.json").is_file():
+        return None
+    from toonset.nerf.run.folder import read_field
+    from toonset.nerf.surface.texture import texture_surface
+    from toonset.nerf.surface.textured_files import encode_textured_glb
+
+    def progress(step: str, done: float) -> None:
+        printer.progress(f"{step} {done:.0%}")
+
+    trained = read_field(run)
+    has_pen = trained.drawings is not None and trained.drawings.pen is not None
+    try:
+        textured = texture_surface(trained, progress=progress, outline=has_pen)
+        return encode_textured_glb(textured)
+    except ToonsetError as error:
+        printer.say(f"no painted body: {error}")
+        return None
 
 
 def _points(

@@ -22,7 +22,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from toonset import __version__, lock
-from toonset.cli.common.help import Verb, Verbs
+from toonset.cli.common.help import Verb, Verbs, complete_at_first_tab
 from toonset.cli.common.output import lead_nowhere, say
 from toonset.cli.common.refusals import MORE_SPACE, refusal
 from toonset.errors import ToonsetError
@@ -76,6 +76,7 @@ def toonset(
     """Turn a hand-drawn character sheet into cameras, a palette and a turning character."""
 
 
+complete_at_first_tab()
 for _verb in VERBS:
     _name = f"{_verb}_" if keyword.iskeyword(_verb) else _verb  # of the function
     _module = importlib.import_module(f"toonset.cli.{MODULES.get(_verb, _name)}")

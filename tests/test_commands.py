@@ -22,7 +22,6 @@ import numpy as np
 import pytest
 import trimesh
 import typer
-from PIL import Image
 from typer.testing import CliRunner
 
 from bench.batch.sheets import write_sheets
@@ -115,7 +114,6 @@ def drawings(drawn: Path, tmp_path_factory: pytest.TempPathFactory, toonset: Too
     assert toonset("palette", folder / "bundle", "-q").code == 0
     for name in ("dark.ase", "my.ase"):
         shutil.copy(folder / "bundle" / "palette.ase", folder / name)
-    _six_figures(folder)
     (folder / "outfits.png").write_bytes(encode_png(make_messy_sheet(6211, ("outfits",)).rgba))
     write_sheets(folder / "library", 2)
 
@@ -170,21 +168,6 @@ def _eight_small(folder: Path) -> None:
     (folder / "points.json").write_text(json.dumps(content))
 
 
-def _six_figures(folder: Path) -> None:
-    """Write a sheet of six figures, a strip of eight, single views and the boxes of the sheet."""
-    cells = []
-    for number in range(6):
-        cell = np.full((120, 80, 3), (244, 240, 232), np.uint8)
-        cell[10:110, 20:60] = (40 + 30 * number, 60, 160)
-        cells.append(cell)
-    (folder / "six").mkdir()
-    Image.fromarray(np.concatenate(cells, axis=1)).save(folder / "six" / "sheet.png")
-    for number, name in enumerate(("front.png", "side.png")):
-        Image.fromarray(cells[number]).save(folder / name)
-    rows = [f"{80 * number + 15},5,50,110" for number in range(6)]
-    (folder / "boxes.csv").write_text("\n".join(["x,y,width,height", *rows, ""]))
-
-
 GIVEN = {  # what lies in a document's folder before its first command
     "README.md": "examples sheet.png strip.png folder held_out mesh.glb dark.ase library",
     "docs/architecture.md": "small/sheet.png small/m.obj",
@@ -195,7 +178,7 @@ GIVEN = {  # what lies in a document's folder before its first command
     " eight/lying.stl eight/other colmap_folder",
     "docs/guide_corrections.md": "small/sheet.png small/mannequin.obj small/corrections.json",
     "docs/guide_palette.md": "bundle sheet.png my.ase",
-    "docs/guide_sheets.md": "six/sheet.png strip.png front.png side.png boxes.csv outfits.png",
+    "docs/guide_sheets.md": "examples outfits.png",
     "docs/guide_training.md": "bundle held_out other dark.ase",
     "docs/guide_viewer.md": "bundle",
 }

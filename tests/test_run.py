@@ -1,6 +1,7 @@
 """./run as a user types it, with a stand-in for the environment that it would set up."""
 
 import os
+import re
 import shlex
 import shutil
 import subprocess
@@ -176,6 +177,22 @@ def test_a_changed_lock_is_installed_and_a_failure_is_shown(checkout: Path) -> N
     assert "install.log" in done.stderr
     assert not (checkout / ".venv/stamp").exists()
     assert not (checkout / "log").exists()
+
+
+def test_setting_up_tells_how_far_it_is(checkout: Path, tmp_path: Path) -> None:
+    with (checkout / "requirements.lock").open("a", encoding="utf-8") as lock:
+        lock.write("# changed\n")
+    sleep = shlex.quote(shutil.which("sleep") or "")
+    install = f"echo 'Downloading torch'; {sleep} 1; exit 0"
+    python_that(checkout, f'case " $* " in *" pip install "*) {install} ;; esac')
+    program(tmp_path / "tools" / "sleep", f"exec {sleep} 0.2")
+    path = f"{tmp_path / 'tools'}{os.pathsep}{os.environ['PATH']}"
+    done = run(checkout, "calibrate", "x", PATH=path)
+    assert done.returncode == 0
+    first, *told = done.stderr.splitlines()
+    assert "setting up .venv" in first
+    assert [line for line in told if re.fullmatch(r"run: \d+ s, \d+ MB  Downloading torch", line)]
+    assert log_of(checkout)[-1] == "[calibrate][x]"
 
 
 def test_a_python_without_ensurepip_gets_the_install_line(checkout: Path, tmp_path: Path) -> None:

@@ -33,6 +33,15 @@ AUTO = "auto"
 PLANNED_AT_ONCE = 500  # sheets of one transaction
 
 
+def _like(incomplete: str) -> list[str]:
+    """Return what a list of stages that is being typed may become."""
+    from toonset.cli.batch.stages import STAGES
+
+    before, comma, last = incomplete.rpartition(",")
+    others = [name for name in STAGES if name not in before.split(",")]
+    return [f"{before}{comma}{name}" for name in others if name.startswith(last)]
+
+
 def batch(
     sheets: Annotated[
         list[str] | None,
@@ -48,7 +57,11 @@ def batch(
     ] = None,
     stages: Annotated[
         str,
-        typer.Option("--stages", help="Of calibrate, palette, train, render, view, mesh, export."),
+        typer.Option(
+            "--stages",
+            help="Of calibrate, palette, train, render, view, mesh, export.",
+            autocompletion=_like,
+        ),
     ] = USUAL,
     given: Annotated[
         list[str] | None,

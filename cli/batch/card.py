@@ -157,11 +157,16 @@ def _summary(card: Mapping[str, Any]) -> str:
     with_labels = card["sheets_with_labels"]
     maps = "all" if with_labels == card["sheets"] else str(with_labels)
     return (
-        f"{card['sheets']} hand-drawn character sheets of {card['characters']} characters, "
-        f"{card['views']} views: every view with its camera and how sure that is. "
+        f"{_count(card['sheets'], 'hand-drawn character sheet')} of "
+        f"{_count(card['characters'], 'character')}, {_count(card['views'], 'view')}: every view "
+        "with its camera and how sure that is. "
         f"Palettes and label maps: {maps} of the sheets. Made with toonset {card['toonset']}; "
         "all figures of this page are in `card.json`."
     )
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'s' * (number != 1)}"
 
 
 def _splits(card: Mapping[str, Any]) -> str:

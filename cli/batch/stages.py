@@ -103,7 +103,11 @@ _LIST = (
     Stage("render", "train", "run", RUN, "turntable", usual=TURNTABLE),
     Stage("view", "train", "folder", RUN, "character.html"),
     Stage("mesh", "train", "run", RUN, "character.glb"),
-    Stage("export", "calibrate", "bundle", BUNDLE, "export", imports="dataset"),
+    Stage(
+        *("export", "calibrate", "bundle", BUNDLE, "export"),
+        usual={("--body",): ("--body", "none")},  # a run may be there or not: another stage's
+        imports="dataset",
+    ),
 )
 STAGES: Mapping[str, Stage] = {stage.name: stage for stage in _LIST}
 RANKS = {name: rank for rank, name in enumerate(STAGES)}

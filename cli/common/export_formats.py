@@ -25,6 +25,7 @@ class Format(StrEnum):
     instant_ngp = "instant-ngp"
     blender_synthetic = "blender-synthetic"
     blender = "blender"
+    blender_addon = "blender-addon"
     gltf = "gltf"
 
 
@@ -36,6 +37,7 @@ class Job:
     views: Sequence[ExportView]
     points: TrackedPoints | None
     mesh: Mesh | None
+    body: bytes | None
     text: bool
     old_layout: bool
     pinholes: bool
@@ -107,7 +109,8 @@ TARGETS = {
     ),
     Format.blender: Target(
         "blender:write_blender_script",
-        (*BESIDE, "import_cameras.py", "scene.glb"),
+        (*BESIDE, "import_cameras.py", "scene.glb", "body.glb"),
+        takes=("body",),
         is_exact=True,
         hint="run it: blender --python {out}/import_cameras.py",
     ),

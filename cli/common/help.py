@@ -9,12 +9,18 @@ import sys
 from typing import Any
 
 import typer
+from typer import _completion_shared
 from typer.core import TyperCommand, TyperGroup
 
 from toonset.errors import UsageError, did_you_mean
 
 NOTHING_ASKED = 2  # exit code, as of any wrong use
 HELP = "help"  # the word, for people who do not try -h
+AT_FIRST_TAB = """
+if [[ $zsh_eval_context[-1] == loadautofunc ]]; then
+  %(complete_func)s "$@"
+fi
+"""
 
 
 class Verb(TyperCommand):
@@ -74,6 +80,16 @@ class Verbs(TyperGroup):
         ]
         with formatter.section("Commands"):
             formatter.write_dl(rows)
+
+
+def complete_at_first_tab() -> None:
+    """Let zsh complete at the first Tab of a session, too.
+
+    It loads the script then; typer's own script only says what completes from the next Tab on.
+    """
+    scripts: dict[str, str] = _completion_shared._completion_scripts
+    if not scripts["zsh"].endswith(AT_FIRST_TAB):
+        scripts["zsh"] += AT_FIRST_TAB
 
 
 def _meant(error: Any) -> str:

@@ -167,10 +167,11 @@ def _model(found: dict[str, Any]) -> str:
     model = found["camera_model"]
     near = sorted(d for d in model["distance_heights"] if d is not None)
     text = f"{model['chosen']}" + (f", {near[0]:.1f} to {near[-1]:.1f} heights" if near else "")
-    tried = "; ".join(
-        f"{t['model']} {t['bic_gain']:+.0f} of {t['margin']:.0f}" for t in model["tried"]
+    tried = ", ".join(
+        f"{t['model']} (BIC {t['bic_gain']:+.0f}, taken from {t['margin']:+.0f})"
+        for t in model["tried"]
     )
-    return text + (f" (BIC gain and what is needed: {tried})" if tried else "")
+    return text + (f"; tried: {tried}" if tried else "")
 
 
 def _pictures(found: dict[str, Any]) -> str:

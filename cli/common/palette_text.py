@@ -76,13 +76,13 @@ def _printed(found: Palette) -> list[str]:
 
 
 def _evidence_line(evidence: Evidence) -> str:
-    """Return why so many colours: with them the drawing is described most briefly."""
+    """Return why so many colours: with them the drawings are described in the fewest bits."""
     number = evidence.colors
     others = [_other_number(number + 1, evidence.one_more)]
     if number > 1:
         others.insert(0, _other_number(number - 1, evidence.one_less))
     colors = "1 colour describes" if number == 1 else f"{number} colours describe"
-    return f"{colors} the drawing most briefly; {', '.join(others)} (bits per {PIXELS:,} pixels)"
+    return f"{colors} {PIXELS:,} pixels in the fewest bits; {', '.join(others)}"
 
 
 def _other_number(number: int, more_bits: float) -> str:

@@ -12,6 +12,7 @@ from toonset.errors import BundleError, CameraError
 from toonset.lock import settle
 
 NAMES = ("transforms.json", "transforms_train.json")
+BELOW = ("test", "views", "bundle")  # folders with cameras in what `synth` and `batch` write
 MAX_SCENE_PIXELS = 2_000_000_000  # of all pictures together: 8 GB in memory
 
 
@@ -53,9 +54,7 @@ def transforms_file(path: Path) -> Path:
         if path.is_dir():
             found = next(filter(None, (member(path, name) for name in NAMES)), None)
             if found is None:
-                raise BundleError(
-                    f"{path}: holds no transforms.json; run `toonset calibrate` first"
-                )
+                raise BundleError(f"{path}: holds no transforms.json; {_instead(path)}")
             path = found
         if not path.exists():
             raise BundleError(f"{path}: does not exist; give a bundle folder or a transforms.json")
@@ -63,6 +62,14 @@ def transforms_file(path: Path) -> Path:
         raise BundleError(f"{str(path)[:80]}: is no file name; correct it") from error
     settle(path.with_name("palette.json"))  # and its maps
     return path
+
+
+def _instead(folder: Path) -> str:
+    """Return what to do about a folder without cameras: `synth` writes those of a sheet below."""
+    below = [name for name in BELOW if any((folder / name / file).is_file() for file in NAMES)]
+    if below:
+        return f"did you mean {' or '.join(str(folder / name) for name in below)}?"
+    return "run `toonset calibrate` first"
 
 
 def read_frames(file: Path, *, need_pictures: bool) -> list[PosedPicture]:

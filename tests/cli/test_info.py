@@ -22,7 +22,7 @@ def test_info_tells_views_colours_and_sizes(place: Path, toonset, snapshot):
     row = "000.png  20 x 24  1.5 px    0.0 +- 0.5    5.7 +- 0.5  0.01    ok"
     assert lines[3].split() == row.split()
     for words in (
-        "orthographic, 4.0 to 4.0 heights (BIC gain and what is needed: perspective -3 of 6)",
+        "orthographic, 4.0 to 4.0 heights; tried: perspective (BIC -3, taken from +6)",
         "3 of 3, 3 labels, 3 contours",
         "2: #c81e14 red 50.0 %, #143cc8 blue 50.0 %",
         "4 vertices, 4 faces",

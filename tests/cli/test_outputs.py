@@ -6,8 +6,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from toonset.cli.common import output
 from toonset.dataset.mesh.load import load_mesh
+from toonset.errors import PaletteError
+from toonset.nerf.options import FACES
+from toonset.nerf.surface import texture
 
 
 def test_mesh_of_a_run(toonset: Callable[..., Any], run: Path, tmp_path: Path) -> None:
@@ -32,6 +37,43 @@ def test_mesh_of_a_run(toonset: Callable[..., Any], run: Path, tmp_path: Path) -
     ):
         assert reason in toonset("mesh", run, "-o", tmp_path / arguments[0], *arguments[1:]).reason
     assert not list(tmp_path.glob("a.*"))
+
+
+def without_palette(*_: Any, **__: Any) -> None:
+    raise PaletteError("it has no palette")
+
+
+def test_blender_gets_the_painted_body(
+    toonset: Callable[..., Any],
+    bundle: Path,
+    run: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    run.rename(bundle / "run")
+    asked = ("export", bundle, "--to", "blender", "-o")
+    done = toonset(*asked, tmp_path / "own")
+    assert done.code == 0, done
+    body = load_mesh(tmp_path / "own" / "body.glb")
+    mannequin = load_mesh(tmp_path / "own" / "mannequin.obj")
+    assert len(body.faces) <= FACES
+    assert abs(body.height / mannequin.height - 1) < 0.1  # one world
+    given = tmp_path / "own" / "body.glb"
+    assert toonset(*asked, tmp_path / "given", "--body", given).code == 0
+    assert (tmp_path / "given" / "body.glb").read_bytes() == given.read_bytes()
+    assert toonset(*asked, tmp_path / "bare", "--body", "none").code == 0
+    assert not (tmp_path / "bare" / "body.glb").exists()
+    for file, reason in (("no.glb", "no.glb: no such file"), ("own/mannequin.obj", "is no GLB")):
+        assert reason in toonset(*asked, tmp_path / "x", "--body", tmp_path / file).reason
+    assert not (tmp_path / "x").exists()
+    elsewhere = ("export", bundle, "--to", "gltf", "--body", given, "-o", tmp_path / "x")
+    assert "--body belongs to --to blender" in toonset(*elsewhere).reason
+    with monkeypatch.context() as patch:
+        patch.setattr(texture, "texture_surface", without_palette)
+        told = toonset(*asked, tmp_path / "unpainted")
+    assert (told.code, "no painted body: it has no palette" in told.err) == (0, True)
+    (bundle / "run" / "model.safetensors").unlink()
+    assert toonset(*asked, tmp_path / "x").code == 2  # a broken run is not passed over
 
 
 def test_a_mesh_in_several_palettes(toonset: Callable[..., Any], run: Path, tmp_path: Path) -> None:

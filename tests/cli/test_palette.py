@@ -55,7 +55,7 @@ def test_a_bundle_gets_its_palette_and_labels(tmp_path, monkeypatch, capsys):
     shown = capsys.readouterr().out.splitlines()
     assert shown[:2] == colors
     assert shown[2].startswith("shares are of all the character's pixels; rule: at least 5 % of")
-    assert shown[3].startswith("2 colours describe the drawing most briefly")
+    assert shown[3].startswith("2 colours describe 4,096 pixels in the fewest bits")
     assert shown[4].startswith("bundle: look at")
     scene = read_scene(tmp_path / "bundle")
     assert scene.palette is not None

@@ -6,9 +6,15 @@
 
 Projects 1,000 points per view with Blender's own world_to_camera_view, and the corners of the
 drawings' planes. The script runs in the scene that Blender starts with, whose cube, light and
-camera must not be in the way. Measured with Blender 5.2.3 LTS (3 bundles, 22 views, perspective and
+camera must not be in the way; its planes are shown first, and its turning camera looks along the
+yaw of its frame. Measured with Blender 5.2.3 LTS (3 bundles, 22 views, perspective and
 orthographic): at most 0.0004 px for points and corners, script and glTF alike; since the script
 opens a GLB itself, with Blender 4.5.15 LTS (2 bundles, 24 views) 0.0003.
+With a painted body and the turn (1 bundle, 8 views): 0.0003 with Debian's 3.4.1, 4.2.23 LTS and
+5.0.1. A Blender of the system runs it, too:
+
+    PYTHONPATH=tests/consumers blender -b --factory-startup --python-use-system-env \\
+        --python tests/consumers/check_blender.py -- a b
 """
 
 from __future__ import annotations
@@ -70,6 +76,19 @@ def check(folder: Path, window: np.ndarray, corner_of: Corner) -> bool:
     return report(f"{folder} in Blender {bpy.app.version_string}", off)
 
 
+def check_turn(scene: Any, views: int) -> None:
+    """Compare the turning camera's yaw with its frame's: one turn, from the front, to +X first."""
+    frames = scene.frame_end - views
+    for step in range(frames):
+        scene.frame_set(views + 1 + step)
+        assert scene.camera.name == "camera turntable"
+        x, y, _ = scene.camera.matrix_world.translation - scene.objects["turntable"].location
+        yaw = np.arctan2(x, -y) % (2 * np.pi)
+        off = (yaw - 2 * np.pi * step / frames + np.pi) % (2 * np.pi) - np.pi
+        assert abs(off) < 1e-4, (step, yaw)
+    scene.frame_set(1)
+
+
 def open_and_check(folder: Path) -> bool:
     """Open what the folder holds in a Blender that has just started, and check it."""
     is_gltf = not (folder / "import_cameras.py").is_file()
@@ -80,10 +99,15 @@ def open_and_check(folder: Path) -> bool:
     started_with = {*bpy.context.scene.objects}
     assert "Cube" in {thing.name for thing in started_with}
     runpy.run_path(str(folder / "import_cameras.py"))
-    assert not started_with & {*bpy.context.scene.objects}
-    render = bpy.context.scene.render
+    scene = bpy.context.scene
+    assert not started_with & {*scene.objects}
+    assert scene.view_settings.view_transform == "Standard"
+    scene.collection.children["drawings"].hide_viewport = False
+    check_turn(scene, len(read_views(folder)))
+    render = scene.render
     return check(folder, np.array([render.resolution_x, render.resolution_y]), middle_of_drawing)
 
 
 if __name__ == "__main__":
-    sys.exit(not all([open_and_check(Path(name)) for name in sys.argv[1:]]))
+    named = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:]
+    sys.exit(not all([open_and_check(Path(name)) for name in named]))

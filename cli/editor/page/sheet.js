@@ -13,6 +13,7 @@ const DEEPEST = 40; // times
 const AROUND = 12; // pixels about the sheet
 const BELOW = 44; // pixels, for the buttons
 const STILL = 3; // pixels: a click that moves less drags nothing
+const STRIP = 0.5; // of the stage's height: a sheet that is lower opens enlarged, about one figure
 
 /**
  * @param {import("./model.js").Model} model
@@ -44,16 +45,20 @@ export function createSheet(model, picture, tool) {
     return [(x - view.x) / view.zoom, (y - view.y) / view.zoom];
   }
 
-  function whole() {
+  /** @param {number} least zoom, whatever room the sheet needs then */
+  function fit(least = 0) {
     const [wide, high] = [canvas.clientWidth - 2 * AROUND, canvas.clientHeight - AROUND - BELOW];
-    const zoom = Math.min(wide / width, high / height);
-    view = {
-      zoom,
-      x: AROUND + (wide - zoom * width) / 2,
-      y: AROUND + (high - zoom * height) / 2,
-    };
+    const zoom = Math.max(least, Math.min(wide / width, high / height));
+    const [x, , across] = model.figure?.box ?? [0, 0, 0];
+    const spare = wide - zoom * width;
+    const middled = spare < 0 ? clamp(wide / 2 - zoom * (x + across / 2), spare, 0) : spare / 2;
+    view = { zoom, x: AROUND + middled, y: AROUND + (high - zoom * height) / 2 };
     draw();
   }
+
+  const whole = () => fit();
+  const enlarged = () => fit((STRIP * (canvas.clientHeight - AROUND - BELOW)) / height);
+  let framed = model.mode === "cameras" ? enlarged : whole;
 
   /** @param {number} factor @param {Point} about on the canvas */
   function zoomBy(factor, about) {
@@ -139,10 +144,10 @@ export function createSheet(model, picture, tool) {
   const middle = () => [canvas.clientWidth / 2, canvas.clientHeight / 2];
   part("closer", HTMLElement).addEventListener("click", () => zoomBy(STEP, middle()));
   part("farther", HTMLElement).addEventListener("click", () => zoomBy(1 / STEP, middle()));
-  part("home", HTMLElement).addEventListener("click", whole);
-  new ResizeObserver(whole).observe(canvas);
+  part("home", HTMLElement).addEventListener("click", () => (framed = whole)());
+  new ResizeObserver(() => framed()).observe(canvas);
   model.listen(draw);
-  whole();
+  framed();
   return {
     draw,
     /** @param {import("./types.js").Box} box what is to be seen well */

@@ -58,5 +58,6 @@ function stateText(model, fits) {
   if (model.trouble) return model.trouble;
   if (model.busy) return "Kept. Fitting…";
   if (model.error) return `Kept, but it cannot be fitted: ${model.error}`;
-  return "Kept and fitted.";
+  const { version, sheet, ...said } = model.said;
+  return Object.keys(said).length ? "Kept and fitted." : "Nothing is corrected yet.";
 }

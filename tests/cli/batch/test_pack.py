@@ -406,6 +406,7 @@ def test_foreign_text_is_text_in_the_card(make: Make, tmp_path: Path) -> None:
     text = (tmp_path / "set" / "README.md").read_text()
     assert "<b>" not in text
     assert "](y)" not in text
+    assert "1 hand-drawn character sheet of 1 character, " in text
     _, front, rest = text.split("---\n", 2)
     assert "evil" not in front
     assert "license: other" in front

@@ -40,6 +40,17 @@ def completed(
     return words
 
 
+def test_zsh_completes_at_the_first_tab_too(
+    toonset: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It runs the script then, as a function: what only registers another one completes nothing."""
+    monkeypatch.setenv("_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION", "1")
+    lines = toonset("--show-completion", "zsh").out.split("\n")
+    loaded = lines.index("if [[ $zsh_eval_context[-1] == loadautofunc ]]; then")
+    assert loaded > lines.index("compdef _toonset_completion toonset")
+    assert lines[loaded + 1].split() == ["_toonset_completion", '"$@"']
+
+
 def test_verbs_are_completed(completed: Callable[[str], set[str]]) -> None:
     assert set(VERBS) <= completed("toonset ")
     assert completed("toonset ca") == {"calibrate"}
@@ -55,7 +66,9 @@ def test_options_are_completed(completed: Callable[[str], set[str]]) -> None:
 @pytest.mark.parametrize(
     ("line", "choices"),
     [
-        ("export bundle --to b", {"blender", "blender-synthetic"}),
+        ("batch --stages calibrate,p", {"calibrate,palette"}),
+        ("batch --stages r", {"render"}),
+        ("export bundle --to b", {"blender", "blender-addon", "blender-synthetic"}),
         ("export bundle --to colmap --layout ", {"new", "old"}),
         ("render run --layer normal", {"normal", "normal-camera"}),
         ("render run --format webp,s", {"webp,sprites", "webp,svg"}),

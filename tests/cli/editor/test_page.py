@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.editor.conftest import Open
-from tests.cli.editor.page_under_test import BOXES, HEXES, HOSTILE, STUDY, Editor
+from tests.cli.editor.page_under_test import BOXES, HEXES, HOSTILE, SIZE_WH, STUDY, Editor
 from toonset.dataset.split_folder.corrections import parse_corrections
 
 
@@ -193,6 +193,19 @@ def test_the_mannequin_is_dragged_and_the_error_is_live(editor: Editor) -> None:
     editor.page.keyboard.up("Alt")
     assert editor.views[0]["camera"]["elevation"] > 5
     assert is_valid(editor)
+
+
+def test_a_strip_opens_enlarged_about_the_chosen_figure(open_page: Open) -> None:
+    editor = open_page(viewport={"width": 500, "height": 1600})
+    stage = editor.page.locator("#stage").bounding_box()
+    assert stage is not None
+    height = editor.place(0, SIZE_WH[1])[1] - editor.place(0, 0)[1]
+    assert 0.4 * stage["height"] < height < 0.6 * stage["height"]
+    x, _, wide, _ = BOXES[0]
+    assert stage["x"] < editor.place(x, 0)[0] < editor.place(x + wide, 0)[0]
+    assert editor.place(x + wide, 0)[0] < stage["x"] + stage["width"]
+    editor.page.locator("#home").click()
+    assert editor.place(SIZE_WH[0], 0)[0] <= stage["x"] + stage["width"]
 
 
 def test_a_click_with_a_trembling_hand_turns_nothing(editor: Editor) -> None:

@@ -106,7 +106,7 @@ def test_an_error_is_shown_and_undone(desk: Desk) -> None:
     editor.page.evaluate("toonset.model.change({ version: 1, boxes: [[0, 0, 9, 9]] })")
     fitted(editor, "background only")
     editor.click("Undo")
-    fitted(editor)
+    fitted(editor, "Nothing is corrected yet.")
 
 
 def test_an_address_that_was_used_is_refused(desk, barriers):

@@ -40,6 +40,17 @@ def change(folder, edit):
     write_json(file, content)
 
 
+def test_a_folder_above_the_cameras_names_those_below(folder, tmp_path_factory):
+    above = tmp_path_factory.mktemp("drawn")
+    with pytest.raises(BundleError, match="run `toonset calibrate` first"):
+        read_cameras(above)
+    (above / "views").mkdir()
+    (folder / "transforms.json").rename(above / "views" / "transforms.json")
+    with pytest.raises(BundleError, match=r"did you mean .*drawn\d*/views\?"):
+        read_cameras(above)
+    assert len(read_cameras(above / "views")) == 2
+
+
 def test_cameras_come_back_exactly(folder):
     points = np.random.default_rng(0).uniform(-1, 2, (50, 3))
     scene = read_scene(folder)

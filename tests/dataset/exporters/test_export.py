@@ -1,11 +1,18 @@
 """Exports: what another program reads is what the bundle says, format by format."""
 
+import ast
 import json
 import math
+import runpy
 import shlex
+import shutil
+import sys
+import zipfile
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -23,6 +30,8 @@ from tests.dataset.exporters.exported_views import (
     off_px,
     views_all_round,
 )
+from toonset import __version__
+from toonset.dataset.exporters.blender_addon import ADDON
 from toonset.dataset.exporters.blender_synthetic import write_blender_synthetic
 from toonset.dataset.exporters.common import read_views
 from toonset.dataset.exporters.nerfstudio import write_transforms
@@ -313,6 +322,62 @@ def test_options_of_colmap_are_refused_elsewhere(toonset, tmp_path: Path) -> Non
         done = toonset("export", tmp_path, "--to", "gltf", "-o", tmp_path / "out", *option)
         assert done.code == 2
         assert "belong to --to colmap" in " ".join(done.err.replace("│", " ").split())
+
+
+def test_the_addon_is_one_file_that_belongs_to_no_bundle(toonset, tmp_path: Path) -> None:
+    out, asked = tmp_path / "addon.zip", ("export", "--to", "blender-addon", "-o")
+    assert toonset(*asked, out).code == 0
+    with zipfile.ZipFile(out) as archive:
+        assert archive.namelist() == ["toonset_sheet/__init__.py"]
+        text = archive.read("toonset_sheet/__init__.py").decode()
+    assert len(text.splitlines()) < 400
+    (info,) = [
+        ast.literal_eval(node.value)
+        for node in ast.parse(text).body
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "bl_info"
+    ]
+    assert ".".join(map(str, info["version"])) in __version__
+    assert info["blender"] == (3, 4, 0)
+    before = out.read_bytes()
+    assert "exists already" in toonset(*asked, out).reason
+    assert toonset(*asked, out, "--force").code == 0
+    assert out.read_bytes() == before
+    assert "end -o in .zip" in toonset(*asked, tmp_path / "addon").reason
+    assert "needs a BUNDLE" in toonset("export", "--to", "gltf", "-o", tmp_path / "x").reason
+    assert "leave out BUNDLE" in toonset(*asked, tmp_path / "x.zip", tmp_path).reason
+    assert [path.name for path in tmp_path.iterdir()] == ["addon.zip"]
+
+
+class Typed:
+    """A base of Blender's, without what Blender does."""
+
+
+def test_what_the_addon_types_is_understood(drawn, toonset, tmp_path, monkeypatch) -> None:
+    blender = MagicMock()
+    blender.path.abspath = lambda path: path
+    for name in ("AddonPreferences", "PropertyGroup", "Operator", "Panel"):
+        setattr(blender.types, name, Typed)
+    monkeypatch.setitem(sys.modules, "bpy", blender)
+    monkeypatch.setitem(sys.modules, "mathutils", MagicMock())
+    file = tmp_path / "addon.py"
+    file.write_text(ADDON.replace("@RELEASE@", "0, 1, 0"))
+    addon = runpy.run_path(str(file))
+    for name in ("sheet.png", "mannequin.obj"):
+        shutil.copy(drawn / name, tmp_path / name)
+    said = [SimpleNamespace(yaw=math.radians(angle), said=angle < 60) for angle in (0, 45, 90)]
+    said += [SimpleNamespace(yaw=math.radians(-90), said=True), SimpleNamespace(yaw=3, said=False)]
+    sheet = SimpleNamespace(
+        path=str(tmp_path / "sheet.png"), mannequin=str(tmp_path / "mannequin.obj"), drawings=said
+    )
+    words = addon["calibrate_words"](sheet)
+    assert words[-2:] == ["--views", "0.0,45.0,?,270.0,?"]
+    sheet.drawings = []
+    assert "--views" not in addon["calibrate_words"](sheet)
+    assert toonset(*addon["calibrate_words"](sheet)).code in addon["FINE"]
+    assert toonset(*addon["export_words"](sheet)).code == 0
+    place = Path(addon["folder_of"](sheet))
+    assert place == tmp_path / "sheet_toonset"
+    assert (place / "scene" / "import_cameras.py").is_file()
 
 
 def test_centre_is_offered_where_it_matters(toonset, tmp_path: Path) -> None:

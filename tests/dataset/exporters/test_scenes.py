@@ -22,6 +22,7 @@ from tests.dataset.exporters.exported_views import (
     off_px,
     views_all_round,
 )
+from toonset.camera import Camera
 from toonset.dataset.exporters.blender import write_blender_script
 from toonset.dataset.exporters.gltf import write_gltf
 from toonset.dataset.mesh.gltf_file import open_gltf
@@ -144,7 +145,7 @@ def test_blender_script_holds_every_view(tmp_path: Path, k: float) -> None:
     write_blender_script(tmp_path / "out", views, egg())
     text = (tmp_path / "out" / "import_cameras.py").read_text()
     compile(text, "import_cameras.py", "exec")
-    records = json.loads(text.split('r"""', 1)[1].split('"""', 1)[0])
+    records = json.loads(text.split('VIEWS = json.loads(r"""', 1)[1].split('"""', 1)[0])
     window = np.array([max(v.camera.size_wh[axis] for v in views) for axis in (0, 1)])
     assert f"WINDOW = ({window[0]}, {window[1]})" in text
     for record, view in zip(records, views, strict=True):
@@ -161,15 +162,69 @@ def test_blender_script_holds_every_view(tmp_path: Path, k: float) -> None:
         near, far = record["clip"]
         assert near < -local[:, 2].max() < -local[:, 2].min() < far
         assert (tmp_path / "out" / "images" / record["name"]).is_file()
+        size = np.array(view.camera.size_wh)
+        fitted = size * (window / size).min()  # Blender's FIT: as large as the window holds
+        np.testing.assert_allclose(fitted * record["of_window"], size)
 
 
-def test_blender_script_shows_a_scene_of_its_own(tmp_path, monkeypatch):
+def test_the_turning_camera_holds_every_side(tmp_path: Path) -> None:
+    views = views_all_round()
+    write_blender_script(tmp_path / "out", views, egg())
+    text = (tmp_path / "out" / "import_cameras.py").read_text()
+    turn = json.loads(text.split('TURN = json.loads(r"""', 1)[1].split('"""', 1)[0])
+    window = np.array([max(v.camera.size_wh[axis] for v in views) for axis in (0, 1)])
+    scale = window[0] / turn["width_world"]
+    vertices = egg().vertices
+    near, far = turn["clip"]
+    for yaw in np.linspace(0, 2 * np.pi, 12, endpoint=False):
+        target = np.array(turn["target"])
+        camera = Camera.looking_at(target, yaw, turn["elevation"], scale, tuple(window))
+        pixels = camera.project(vertices)[0]
+        assert (pixels > 0).all()
+        assert (pixels < window).all()
+        depth = (vertices - target) @ camera.rotation[2] + turn["distance"]
+        assert near < depth.min() < depth.max() < far
+
+
+@pytest.fixture
+def blender(monkeypatch: pytest.MonkeyPatch) -> MagicMock:
+    """Return a stand-in for Blender's module: it takes anything."""
+    stand_in = MagicMock()
+    stand_in.app.version, stand_in.app.version_string = (5, 0, 1), "5.0.1"
+    stand_in.app.background = True
+    monkeypatch.setitem(sys.modules, "bpy", stand_in)
+    monkeypatch.setitem(sys.modules, "mathutils", MagicMock())
+    return stand_in
+
+
+def test_blender_script_opens_the_painted_body(tmp_path: Path, blender: MagicMock) -> None:
+    write_blender_script(tmp_path / "out", views_all_round(2), egg(), body=b"glTF body")
+    assert (tmp_path / "out" / "body.glb").read_bytes() == b"glTF body"
+    runpy.run_path(str(tmp_path / "out" / "import_cameras.py"))
+    files = [call.kwargs["filepath"] for call in blender.ops.import_scene.gltf.call_args_list]
+    assert files == [str(tmp_path / "out" / name) for name in ("scene.glb", "body.glb")]
+
+
+def test_a_blender_that_cannot_do_it_is_told_in_one_line(tmp_path, blender, monkeypatch, capsys):
+    write_blender_script(tmp_path / "out", views_all_round(2), egg())
+    script = str(tmp_path / "out" / "import_cameras.py")
+    blender.app.version = (3, 3, 1)
+    with pytest.raises(SystemExit, match=r"needs Blender 3\.4 or later"):
+        runpy.run_path(script)
+    blender.app.version = (3, 4, 1)
+    monkeypatch.setitem(sys.modules, "numpy", None)
+    with pytest.raises(SystemExit, match=r"has no numpy, .* install it"):
+        runpy.run_path(script)
+    blender.app.background = False  # to leave would close the window
+    runpy.run_path(script)
+    assert capsys.readouterr().err.count("\n") == 1
+    blender.data.scenes.new.assert_not_called()
+
+
+def test_blender_script_shows_a_scene_of_its_own(tmp_path: Path, blender: MagicMock) -> None:
     """Blender starts with a cube where the character stands; it must not be in the picture."""
     write_blender_script(tmp_path / "out", views_all_round(2), egg())
-    blender = MagicMock()
     started_with, own = blender.context.scene, blender.data.scenes.new.return_value
-    monkeypatch.setitem(sys.modules, "bpy", blender)
-    monkeypatch.setitem(sys.modules, "mathutils", MagicMock())
     runpy.run_path(str(tmp_path / "out" / "import_cameras.py"))
     assert blender.context.window.scene is own
     scene = str(tmp_path / "out" / "scene.glb")
