@@ -30,10 +30,11 @@ from toonset.nerf.look.drawings import Original
 from toonset.nerf.render.turntable import FILL, drawn_on_sheet, filled_box, framed
 from toonset.nerf.render.views import render
 from toonset.nerf.run.folder import CONFIG, read_field
+from toonset.nerf.viewer.layered import page_paints
 from toonset.nerf.viewer.page import page_html
 from toonset.nerf.viewer.ring import VIEWS, Ring, ring_through
 from toonset.nerf.viewer.scene import SMALL, Blob, camera_record, coding, webp
-from toonset.nerf.viewer.sights import body_picture, body_sights, figure_sights, layers_of
+from toonset.nerf.viewer.sights import body_picture, body_sights, figure_sights, layers_of, paints_and_pen
 from toonset.palette.color_names import name_of
 from toonset.palette.palette import Palette
 
@@ -126,7 +127,7 @@ def run_page(
         **about,
         "layers": layers,
         "pen": drawings and drawings.pen and {"rgb": list(drawings.pen.rgb)},
-        "paints": [] if drawings is None else drawings.paints.tolist(),
+        "paints": [] if drawings is None else page_paints(*paints_and_pen(drawings)).tolist(),
     }
     start = render(trained, cameras[ring.start])
     sights = figure_sights(trained, cameras, ring.layered, start)

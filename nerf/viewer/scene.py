@@ -13,13 +13,13 @@ from jaxtyping import UInt8
 from PIL import Image
 
 from toonset.camera import Camera
-from toonset.nerf.viewer.layered import LEVELS, MOVES, PARTS, Layered
+from toonset.nerf.viewer.layered import LEVELS, Layered
+from toonset.nerf.viewer.light import BRIGHTEST, DARKEST, LIGHTEST, MIDDLE, TINT
+from toonset.nerf.viewer.unmix import MOVES, PARTS
 
 EFFORT = 7  # 9 takes five times as long for 2 %
 QUALITY = 80  # of WebP pictures
 SMALL = {"quality": 60, "alpha_quality": 50}  # of further layers: 60 % of the bytes for 2 dB
-REST_STEP = 2  # levels of 255: how it is kept, since it may be as far off either way
-MIDDLE = 128
 
 Picture = UInt8[np.ndarray, "height width 4"]
 
@@ -65,8 +65,11 @@ def coding() -> dict[str, Any]:
         "levels": LEVELS,
         "parts": PARTS,
         "moves": MOVES.tolist(),
-        "step": REST_STEP,
         "middle": MIDDLE,
+        "darkest": DARKEST,
+        "lightest": LIGHTEST,
+        "brightest": BRIGHTEST,
+        "tint": TINT,
     }
 
 
@@ -80,25 +83,24 @@ def layered_record(view: Layered | None, shrink: int = 1) -> dict[str, Any] | No
     """
     if view is None:
         return None
-    there = view.alpha > 0
+    paints, there = view.paints, view.alpha > 0
     soft = there & (view.alpha < LEVELS)
     inked = there & (view.ink == LEVELS)
     lined = there & (view.ink > 0) & ~inked
-    mixed = there & (view.part > 0)
-    other = there & (view.moved > 0)
+    mixed = there & (paints.part > 0) & ~inked
+    other = there & (paints.moved > 0) & ~inked
     flags = (there & ~soft) + 2 * soft + 4 * inked + 8 * lined + 16 * mixed + 32 * other
-    planes = [view.first, flags.astype(np.uint8)]
+    planes = [paints.first, flags.astype(np.uint8)]
     lists = [
-        *(view.alpha[soft], view.ink[lined], view.second[mixed], view.part[mixed]),
-        view.moved[other],
+        *(view.alpha[soft], view.ink[lined], paints.second[mixed], paints.part[mixed]),
+        paints.moved[other],
     ]
     height, width = view.alpha.shape
-    rest = np.rint(view.rest / REST_STEP + MIDDLE).clip(0, 255).astype(np.uint8)
     return {
         "box": [shrink * side for side in (*view.corner, width, height)],
         "size": [width, height],
         "maps": b"".join(part.tobytes() for part in (*planes, *lists)),
-        "rest": webp(rest) if view.rest.any() else None,
+        "light": None if view.light is None else webp(view.light.picture()),
     }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -15,6 +16,8 @@ from toonset.dataset.mesh.rasterize import depth_and_normals
 from toonset.mesh import Mesh
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.kernels.threads import side_by_side
+from toonset.nerf.look.drawings import Drawings
+from toonset.nerf.look.outline import Outline
 from toonset.nerf.render.baked import Baked
 from toonset.nerf.render.layers import Rendering, default_layer
 from toonset.nerf.render.views import baked_of, render
@@ -36,6 +39,11 @@ def layers_of(trained: TrainedField) -> list[str]:
     missing |= set() if trained.palette is not None else {"palette"}
     layers = [layer for layer in LAYERS if layer not in missing]
     return sorted(layers, key=lambda layer: layer != default_layer(trained))
+
+
+def paints_and_pen(drawings: Drawings) -> tuple[UInt8[np.ndarray, "paints 3"], Outline | None]:
+    """Return the paints that a page knows beside its lines', and the pen that draws these."""
+    return (drawings.paints if drawings.pen is None else drawings.palette), drawings.pen
 
 
 def figure_sights(
@@ -93,8 +101,11 @@ def _layer(view: Rendering, layer: str) -> Record | None:
     drawings = view.field.drawings
     if layer != "drawn" or drawings is None:
         return picture_record(view.picture(layer))
-    pen = None if drawings.pen is None else drawings.pen.rgb
-    return layered_record(layered(view.drawn, drawings.paints, pen, drawings.drawn_shadow))
+    paints, pen = paints_and_pen(drawings)
+    if pen is not None:
+        finer = view.camera.scale / min(one.camera.scale for one in drawings.views)
+        pen = replace(pen, width_px=pen.width_px * finer)
+    return layered_record(layered(view.drawn, paints, pen, drawings.drawn_shadow))
 
 
 def _small_layer(view: Rendering, small: Rendering, layer: str) -> Record | None:

@@ -63,7 +63,8 @@ function start(blob) {
       sight,
       layer: scene.layers[0],
       colors: scene.palette.map((paint) => paint.rgb),
-      ink: scene.pen && scene.pen.rgb,
+      pen: scene.pen && scene.pen.rgb,
+      lines: true,
       ...shot,
     };
   };

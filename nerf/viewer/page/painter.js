@@ -7,7 +7,7 @@ import { newCanvas, pictureAt } from "./scene.js";
 /** @typedef {import("./types.js").LayerRecord} LayerRecord */
 /** @typedef {import("./types.js").Scene} Scene */
 /** @typedef {import("./types.js").Shot} Shot */
-/** @typedef {{picture?: ImageBitmap, rest?: Uint8ClampedArray | null}} Loaded what a record's files hold */
+/** @typedef {{picture?: ImageBitmap, light?: Uint8ClampedArray | null}} Loaded what a record's files hold */
 
 /**
  * @param {HTMLCanvasElement} canvas
@@ -36,24 +36,26 @@ export function createPainter(canvas, scene, blob, ask) {
     /** @type {Loaded} */
     const found = record.picture
       ? { picture: await pictureAt(blob, record.picture) }
-      : { rest: record.rest ? pixelsOf(await pictureAt(blob, record.rest)) : null };
+      : { light: record.light ? pixelsOf(await pictureAt(blob, record.light)) : null };
     loaded.set(record, found);
     return found;
   }
 
   /** @param {LayerRecord} record @param {Loaded} files @param {Shot} shot @returns {CanvasImageSource} */
-  function pictureOf(record, files, { colors, ink }) {
+  function pictureOf(record, files, { colors, pen, lines }) {
     if (files.picture) return files.picture;
-    const key = JSON.stringify([colors, ink]);
+    const key = JSON.stringify([colors, pen, lines]);
     if (key !== shown) made.clear();
     shown = key;
     const known = made.get(record);
     if (known) return known;
     const [start, length] = record.maps;
-    const now = [...colors, ...scene.paints.slice(colors.length)];
-    const old = [...scene.palette.map((paint) => paint.rgb), ...scene.paints.slice(scene.palette.length)];
+    const others = scene.paints.slice(colors.length);
+    const old = [...scene.palette.map((paint) => paint.rgb), ...others];
+    const now = [...colors, ...(pen ? [...others.slice(0, -1), pen] : others)];
     const maps = blob.subarray(start, start + length);
-    const pixels = composed(record, maps, files.rest ?? null, { old, now, ink }, scene.coding);
+    const ink = lines ? pen : null;
+    const pixels = composed(record, maps, files.light ?? null, { old, now, ink }, scene.coding);
     const picture = newCanvas(pixels.width, pixels.height, (context) => context.putImageData(pixels, 0, 0));
     made.set(record, picture);
     return picture;

@@ -30,9 +30,8 @@ const SIDES = [
  * @returns {Shot}
  */
 export function shotOf(scene, state) {
-  const { layer, colors, lines } = state;
-  const ink = lines ? state.ink : null;
-  return { camera: shownCamera(scene, state), sight: shownSight(scene, state), layer, colors, ink };
+  const { layer, colors, lines, ink: pen } = state;
+  return { camera: shownCamera(scene, state), sight: shownSight(scene, state), layer, colors, pen, lines };
 }
 
 /**

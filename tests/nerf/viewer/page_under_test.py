@@ -14,6 +14,7 @@ from playwright.sync_api import Page
 
 from toonset.camera import Camera
 from toonset.nerf.look.blend import DrawnView
+from toonset.nerf.look.outline import Outline
 from toonset.nerf.viewer.layered import layered
 from toonset.nerf.viewer.page import page_html
 from toonset.nerf.viewer.scene import (
@@ -60,7 +61,7 @@ def drawn_ellipse(camera: Camera) -> DrawnView:
 def _sight(yaw: float, elevation: float, level: int, whole: bool) -> dict[str, Any]:
     view = drawn_ellipse(sight_camera(yaw, elevation))
     red, green, blue = PEN
-    found = layered(view, np.array(COLORS, np.uint8), (red, green, blue))
+    found = layered(view, np.array(COLORS, np.uint8), Outline((red, green, blue), 0.1 * SIDE))
     layers = {"drawn": layered_record(found)}
     for i, layer in enumerate(("rgb", "normal", "depth", "source") if whole else ()):
         grey = np.full((SIDE, SIDE, 1), 40 * i, np.uint8)
@@ -122,7 +123,7 @@ def figure_scene(**changes: Any) -> tuple[dict[str, Any], bytes]:
             {"name": name, "rgb": rgb, "share": share}
             for name, rgb, share in zip(names, COLORS, (0.6, 0.3, 0.1), strict=True)
         ],
-        "paints": list(COLORS),
+        "paints": [*COLORS, PEN],
         "coding": coding(),
         "pen": {"rgb": PEN},
         "views": views,

@@ -177,7 +177,7 @@ def test_layers_are_a_radio_group_and_a_recoloured_paint_is_undone(open_page: Op
     page.get_by_role("radio", name="Drawn").check()
     viewer.rest()
     assert viewer.pixel(0.5, 0.6) == [0, 255, 0, 255]
-    assert viewer.shot["ink"] == [0, 0, 255]
+    assert viewer.shot["pen"] == [0, 0, 255]
     page.get_by_role("button", name="Undo").click()
     assert viewer.state["ink"] == PEN
     assert viewer.state["colors"][0] == [0, 255, 0]

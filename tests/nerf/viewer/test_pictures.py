@@ -163,11 +163,11 @@ def test_lines_are_switched_off(pages: dict[str, Shown]) -> None:
         line = (view.ink > 0.9 * view.alpha) & (view.alpha >= SOLID)
         if i in one.ring.own:  # a drawing's own lines lie a little beside
             continue
-        with_lines, without = shown(one.page, i), shown(one.page, i, ink=None)
+        with_lines, without = shown(one.page, i), shown(one.page, i, lines=False)
         assert like(with_lines, pen.rgb)[line].mean() > 0.9
         assert like(without, pen.rgb)[line].mean() < 0.1
         np.testing.assert_array_equal(with_lines[..., 3], without[..., 3])
-        blue = shown(one.page, i, ink=[0, 0, 255])
+        blue = shown(one.page, i, pen=[0, 0, 255])
         assert like(blue, (0, 0, 255))[line].mean() > 0.9
 
 
