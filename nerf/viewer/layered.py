@@ -115,7 +115,7 @@ def layered_shares(
     part[second == first] = 0
     none = np.zeros(alpha.shape, np.uint8)
     cover = np.rint(alpha.clip(0, 1) * LEVELS).astype(np.uint8)
-    return Layered(corner, cover, none, Unmixed(first, second, part, none), None)
+    return Layered(corner, cover, none, Unmixed(first, second, part, none > 0), None)
 
 
 def _box(there: Mask) -> tuple[Box, tuple[int, int]]:

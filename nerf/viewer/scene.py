@@ -15,7 +15,7 @@ from PIL import Image
 from toonset.camera import Camera
 from toonset.nerf.viewer.layered import LEVELS, Layered
 from toonset.nerf.viewer.light import BRIGHTEST, DARKEST, LIGHTEST, MIDDLE, TINT
-from toonset.nerf.viewer.unmix import MOVES, PARTS
+from toonset.nerf.viewer.unmix import PARTS
 
 EFFORT = 7  # 9 takes five times as long for 2 %
 QUALITY = 80  # of WebP pictures
@@ -64,7 +64,6 @@ def coding() -> dict[str, Any]:
     return {
         "levels": LEVELS,
         "parts": PARTS,
-        "moves": MOVES.tolist(),
         "middle": MIDDLE,
         "darkest": DARKEST,
         "lightest": LIGHTEST,
@@ -77,9 +76,8 @@ def layered_record(view: Layered | None, shrink: int = 1) -> dict[str, Any] | No
     """Return a view's layers: see `page/compose.js`, which puts them together.
 
     `maps` holds, for every pixel row after row, first the paint and then what is to be read of it
-    (alpha 1 whole, 2 soft; 4 ink, 8 soft ink; 16 a mixture; 32 moves otherwise than its paint);
-    then the soft alphas, soft inks, second paints, their parts and the moves of the pixels that
-    have any.
+    (alpha 1 whole, 2 soft; 4 ink, 8 soft ink; 16 a mixture; 32 stays as it is);
+    then the soft alphas, soft inks, second paints and their parts of the pixels that have any.
     """
     if view is None:
         return None
@@ -88,13 +86,10 @@ def layered_record(view: Layered | None, shrink: int = 1) -> dict[str, Any] | No
     inked = there & (view.ink == LEVELS)
     lined = there & (view.ink > 0) & ~inked
     mixed = there & (paints.part > 0) & ~inked
-    other = there & (paints.moved > 0) & ~inked
-    flags = (there & ~soft) + 2 * soft + 4 * inked + 8 * lined + 16 * mixed + 32 * other
+    stays = there & paints.stays & ~inked
+    flags = (there & ~soft) + 2 * soft + 4 * inked + 8 * lined + 16 * mixed + 32 * stays
     planes = [paints.first, flags.astype(np.uint8)]
-    lists = [
-        *(view.alpha[soft], view.ink[lined], paints.second[mixed], paints.part[mixed]),
-        paints.moved[other],
-    ]
+    lists = [view.alpha[soft], view.ink[lined], paints.second[mixed], paints.part[mixed]]
     height, width = view.alpha.shape
     return {
         "box": [shrink * side for side in (*view.corner, width, height)],

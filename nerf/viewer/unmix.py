@@ -15,17 +15,15 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.palette.palette import Shadow
-from toonset.palette.pixels.recolor import share_moved
 from toonset.raster import from_nearest
 
 PARTS = 16  # of a mixture
-MOVES = np.array([1, 0, 0.5])  # kinds of `moved`
 LIKE = 9.0  # levels of 255: a colour so near to its paint is that paint
 AROUND = 7  # pixels, a window's side: paints in it may be in a mixture, the commonest COMMON
 COMMON = 4
 BETTER = 1.15  # a mixture explains a colour so much better, squared, or it is none
 LINELESS = 2.0  # the same of one without the line's colour, where there are lines
-FAR = 16.0  # levels of 255: a colour not so far from its mixture moves as that does
+FAR = 26.0  # levels of 255: a colour so far from all shades of its mixture is none of it
 ELSE = 2.0  # times LIKE: so much worse is a paint that is not around
 STRANGE = 2.5  # times LIKE: what is not so like it is not that paint
 SHADED = 1.5  # times LIKE: so much worse is a shade of a paint
@@ -45,13 +43,13 @@ class Unmixed:
     Attributes:
         first, second: (height, width) paints.
         part: (height, width) of the second, 0 to PARTS / 2.
-        moved: (height, width) how far a colour moves with its paints: one of MOVES.
+        stays: (height, width) no shade of its paints, it does not change with them.
     """
 
     first: Map
     second: Map
     part: Map
-    moved: Map
+    stays: Mask
 
     def share(self, paint: int) -> Float[np.ndarray, "height width"]:
         """Return how much of every pixel a paint covers."""
@@ -72,7 +70,7 @@ class Unmixed:
         if at.any() and known.any():
             other = from_nearest(other, known)
             self.first[at] = self.second[at] = other[at]
-            self.part[at] = self.moved[at] = 0
+            self.part[at], self.stays[at] = 0, False
         return share
 
     def colors(self, paints: Float[np.ndarray, "paints 3"]) -> Float[np.ndarray, "h w 3"]:
@@ -100,7 +98,7 @@ def unmixed(
         shadow: that the drawings have.
     """
     known = paints.astype(np.float32)
-    first, part, moved = labels.copy(), np.zeros_like(labels), np.zeros_like(labels)
+    first, part, stays = labels.copy(), np.zeros_like(labels), np.zeros_like(there)
     cores = _cores(color, there, known, line)
     if shadow is not None:
         cores = _in_light(cores, labels, known * np.array(shadow.factor, np.float32), known)
@@ -123,11 +121,9 @@ def unmixed(
     for whole, values in ((first, a), (second, b), (part, steps)):
         whole.reshape(-1)[at] = values
     cover = known[a] + (steps / PARTS).astype(np.float32)[:, None] * (known[b] - known[a])
-    far = np.flatnonzero(np.abs(own - cover).max(axis=1) > FAR)
-    share = share_moved(own[far].astype(np.uint8), cover[far]) > 0
-    moved.reshape(-1)[at[far[~share]]] = 1
-    kept = cv2.morphologyEx(moved, cv2.MORPH_OPEN, TWO)
-    return Unmixed(first, second, part, kept)
+    stays.reshape(-1)[at] = _off_shade(own, cover) > FAR**2
+    stays &= cv2.morphologyEx(stays.view(np.uint8), cv2.MORPH_OPEN, TWO).view(np.bool_)
+    return Unmixed(first, second, part, stays)
 
 
 def _cores(
@@ -242,7 +238,8 @@ class _Near:
         a = self.common[0].copy()
         least = np.full(len(color), np.inf, np.float32)
         for one, count in zip(self.common, self.count, strict=True):
-            off = np.minimum(_apart(color, known[one]), _shade_apart(color, known[one]))
+            shade = _off_shade(color, known[one]) + (SHADED * LIKE) ** 2
+            off = np.minimum(_apart(color, known[one]), shade)
             better = (count > 0) & (off < least)
             a, least = np.where(better, one, a), np.where(better, off, least)
         b, t = a.copy(), np.zeros(len(color), np.float32)
@@ -276,12 +273,12 @@ def _counts(mask: Mask) -> UInt8[np.ndarray, "height width"]:
     )
 
 
-def _shade_apart(
-    color: Float[np.ndarray, "n 3"], paint: Float[np.ndarray, "n 3"]
+def _off_shade(
+    color: Float[np.ndarray, "n 3"], paint: Float[np.ndarray, "*n 3"]
 ) -> Float[np.ndarray, " n"]:
-    """Return how far colours are from a shade of a paint, squared, and what shades are worse by."""
-    shade = _dot(color, paint) / np.maximum(_dot(paint, paint), 1)
-    return _apart(color, shade.clip(DARKEST, BRIGHTEST)[:, None] * paint) + (SHADED * LIKE) ** 2
+    """Return how far colours are from the nearest shade of a paint, squared."""
+    shade = (color * paint).sum(axis=1) / np.maximum(np.square(paint).sum(axis=-1), 1)
+    return _apart(color, shade.clip(DARKEST, BRIGHTEST)[:, None] * paint)
 
 
 def _apart(

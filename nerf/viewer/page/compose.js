@@ -10,7 +10,7 @@
  * @property {number[] | null} ink of the lines; null: without lines
  */
 
-const [SOFT, INKED, LINED, MIXED, MOVED] = [2, 4, 8, 16, 32]; // flags of a pixel; 1: opaque
+const [SOFT, INKED, LINED, MIXED, STAYS] = [2, 4, 8, 16, 32]; // flags of a pixel; 1: opaque
 const LUMA = [0.299, 0.587, 0.114]; // Source: ITU-R BT.601
 
 /**
@@ -22,13 +22,13 @@ const LUMA = [0.299, 0.587, 0.114]; // Source: ITU-R BT.601
  * @returns {ImageData} straight alpha
  */
 export function composed({ size: [width, height] }, maps, light, colors, coding) {
-  const { levels, parts, moves, middle, darkest, lightest, brightest, tint } = coding;
+  const { levels, parts, middle, darkest, lightest, brightest, tint } = coding;
   const turn = middle + (brightest - 1) * (middle - darkest); // the level of the largest gain
   const count = width * height;
   const flags = maps.subarray(count, 2 * count);
-  const many = [SOFT, LINED, MIXED, MIXED].map((flag) => flags.reduce((n, f) => n + (f & flag ? 1 : 0), 0));
+  const many = [SOFT, LINED, MIXED].map((flag) => flags.reduce((n, f) => n + (f & flag ? 1 : 0), 0));
   let at = 2 * count;
-  let [alphaAt, inkAt, secondAt, partAt, movedAt] = [0, ...many].map((n) => (at += n));
+  let [alphaAt, inkAt, secondAt, partAt] = [0, ...many].map((n) => (at += n));
   const [old, now] = [colors.old, colors.now].map((table) => Float32Array.from(table.flat()));
   const picture = new ImageData(width, height);
   const { data } = picture;
@@ -41,7 +41,6 @@ export function composed({ size: [width, height] }, maps, light, colors, coding)
     const covered = flag & INKED ? 1 : flag & LINED ? maps[inkAt++] / levels : 0;
     const b = flag & MIXED ? 3 * maps[secondAt++] : a;
     const part = flag & MIXED ? maps[partAt++] / parts : 0;
-    const moved = flag & MOVED ? moves[maps[movedAt++]] : 1;
     let [gain, glow] = [1, 0];
     off.fill(0);
     if (light && !(flag & INKED)) {
@@ -56,7 +55,7 @@ export function composed({ size: [width, height] }, maps, light, colors, coding)
     for (let c = 0; c < 3; c++) {
       const before = old[a + c] + part * (old[b + c] - old[a + c]);
       const after = now[a + c] + part * (now[b + c] - now[a + c]);
-      let value = before + moved * (after - before);
+      let value = flag & STAYS ? before : after;
       value = Math.min(1, gain) * value + Math.max(0, gain - 1) * before; // as much brighter as it was
       value += glow * (255 - value) + off[c];
       value = Math.min(255, Math.max(0, value));

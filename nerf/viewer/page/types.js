@@ -33,7 +33,6 @@
  * @typedef {object} Coding how a `LayeredRecord` is to be read
  * @property {number} levels of alpha and ink, from nothing to all
  * @property {number} parts of a mixture
- * @property {number[]} moves how far a colour may move with its paints
  * @property {number} middle the level of `light` that changes nothing: see nerf/viewer/light.py
  * @property {number} darkest the level of black
  * @property {number} lightest the level of white
