@@ -28,6 +28,15 @@ def view(
             show_default=False,
         ),
     ] = None,
+    title: Annotated[
+        str,
+        typer.Option(
+            "--title",
+            metavar="TEXT",
+            help="Title of the page and name of what it saves (default: the sheet's name).",
+            show_default=False,
+        ),
+    ] = "",
     force: ForceFlag = False,
     as_json: JsonFlag = False,
     quiet: QuietFlag = False,
@@ -43,6 +52,7 @@ def view(
     if out.suffix.lower() not in (".html", ".htm"):
         raise typer.BadParameter(f"{out}: a page's name ends in .html", param_hint="--out")
     from toonset.errors import BundleError
+    from toonset.palette.names import one_line
     from toonset.nerf.viewer.build import view_html
     from toonset.read import check_there
     from toonset.write import check_new_file, new_files, write_bytes
@@ -50,7 +60,7 @@ def view(
     check_there([folder], "run or bundle", BundleError)
     check_new_file(out, force=force)
     printer.progress("drawing all views of the page")
-    data = view_html(folder, size).encode("utf-8")
+    data = view_html(folder, size, one_line(title)).encode("utf-8")
     with new_files(out, force=force) as new:
         write_bytes(new / out.name, data)
     printer.result(

@@ -7,12 +7,12 @@ import zlib
 from dataclasses import dataclass, field
 from typing import Any
 
-import cv2
 import numpy as np
 from jaxtyping import UInt8
 from PIL import Image
 
 from toonset.camera import Camera
+from toonset.nerf.look.blend import DRAWN, GUESSED, MIRRORED, SOLID, DrawnView
 from toonset.nerf.viewer.layered import LEVELS, Layered
 from toonset.nerf.viewer.light import BRIGHTEST, DARKEST, LIGHTEST, MIDDLE, TINT
 from toonset.nerf.viewer.unmix import PARTS
@@ -20,6 +20,8 @@ from toonset.nerf.viewer.unmix import PARTS
 EFFORT = 7  # 9 takes five times as long for 2 %
 QUALITY = 80  # of WebP pictures
 SMALL = {"quality": 60, "alpha_quality": 50}  # of further layers: 60 % of the bytes for 2 dB
+
+ORIGIN_STEP = 2  # pixels of a view for one of its map of what is not drawn
 
 Picture = UInt8[np.ndarray, "height width 4"]
 
@@ -99,6 +101,25 @@ def layered_record(view: Layered | None, shrink: int = 1) -> dict[str, Any] | No
     }
 
 
+def origins_record(view: DrawnView, found: Layered) -> dict[str, Any] | None:
+    """Return where no drawing shows a view; None where that is nowhere.
+
+    A byte for ORIGIN_STEP by ORIGIN_STEP pixels of the layers' box: see `page/types.js`.
+    """
+    left, top = found.corner
+    height, width = found.alpha.shape
+    box = (slice(top, top + height, ORIGIN_STEP), slice(left, left + width, ORIGIN_STEP))
+    source = np.where(view.alpha[box] >= SOLID, view.source[box], DRAWN).astype(np.uint8)
+    if not source.any():
+        return None
+    return {
+        "size": [source.shape[1], source.shape[0]],
+        "mirrored": view.share(MIRRORED),
+        "guessed": view.share(GUESSED),
+        "map": source.tobytes(),
+    }
+
+
 def picture_record(picture: Picture, shrink: int = 1) -> dict[str, Any] | None:
     """Return a picture, cut to what it shows; None where that is nothing.
 
@@ -126,19 +147,3 @@ def webp(
         file, "WEBP", quality=quality, alpha_quality=alpha_quality, method=4
     )
     return file.getvalue()
-
-
-def smaller(picture: Picture, shrink: int) -> Picture:
-    """Return a picture made `shrink` times smaller; transparent pixels lend no colour."""
-    height, width = (-(-side // shrink) for side in picture.shape[:2])
-    room = [
-        (0, shrink * size - side)
-        for size, side in zip((height, width), picture.shape, strict=False)
-    ]
-    whole = np.pad(picture, [*room, (0, 0)])
-    alpha = whole[..., 3:].astype(np.float32)
-    both = cv2.resize(
-        np.dstack([whole[..., :3] * alpha, alpha]), (width, height), interpolation=cv2.INTER_AREA
-    )
-    both[..., :3] /= np.maximum(both[..., 3:], 1e-3)
-    return np.rint(both).clip(0, 255).astype(np.uint8)

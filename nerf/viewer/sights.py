@@ -22,9 +22,9 @@ from toonset.nerf.render.baked import Baked
 from toonset.nerf.render.layers import Rendering, default_layer
 from toonset.nerf.render.views import baked_of, render
 from toonset.nerf.viewer.layered import layered, layered_shares
-from toonset.nerf.viewer.scene import layered_record, picture_record, smaller
+from toonset.nerf.viewer.scene import layered_record, origins_record, picture_record
 
-LAYERS = ("drawn", "rgb", "palette", "normal", "depth", "source")
+LAYERS = ("drawn", "rgb", "palette", "normal", "depth")
 SHRINK = 2  # pixels of the layer that is seen at first for one of the others
 BODY, AMBIENT = (158, 178, 204), 0.55  # sRGB of a plain body, and its light from everywhere
 LIGHT = np.array([-0.4, -0.6, -0.7]) / np.linalg.norm([-0.4, -0.6, -0.7])  # camera axes
@@ -35,7 +35,7 @@ Record = dict[str, Any]
 
 def layers_of(trained: TrainedField) -> list[str]:
     """Return the layers that a figure's page has, the first at the start."""
-    missing = set() if trained.drawings is not None else {"drawn", "source"}
+    missing = set() if trained.drawings is not None else {"drawn"}
     missing |= set() if trained.palette is not None else {"palette"}
     layers = [layer for layer in LAYERS if layer not in missing]
     return sorted(layers, key=lambda layer: layer != default_layer(trained))
@@ -93,7 +93,7 @@ def _sight(baked: Baked, made: Callable[[], Rendering], layers: Sequence[str]) -
     small = render(baked, view.camera.resized(1 / SHRINK))
     return {
         layers[0]: _layer(view, layers[0]),
-        **{layer: _small_layer(view, small, layer) for layer in layers[1:]},
+        **{layer: _small_layer(small, layer) for layer in layers[1:]},
     }
 
 
@@ -105,15 +105,16 @@ def _layer(view: Rendering, layer: str) -> Record | None:
     if pen is not None:
         finer = view.camera.scale / min(one.camera.scale for one in drawings.views)
         pen = replace(pen, width_px=pen.width_px * finer)
-    return layered_record(layered(view.drawn, paints, pen, drawings.drawn_shadow))
+    found = layered(view.drawn, paints, pen, drawings.drawn_shadow)
+    record = layered_record(found)
+    return record and found and {**record, "origins": origins_record(view.drawn, found)}
 
 
-def _small_layer(view: Rendering, small: Rendering, layer: str) -> Record | None:
-    """Return a layer of a small view; where paint comes from is told by the view itself."""
+def _small_layer(small: Rendering, layer: str) -> Record | None:
+    """Return a layer of a small view."""
     if layer == "palette" and small.shares is not None:
         return layered_record(layered_shares(small.shares, small.alpha), SHRINK)
-    own = smaller(view.picture(layer), SHRINK) if layer == "source" else small.picture(layer)
-    return picture_record(own, SHRINK)
+    return picture_record(small.picture(layer), SHRINK)
 
 
 def _body_sight(mesh: Mesh, camera: Camera) -> Record:

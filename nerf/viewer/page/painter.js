@@ -9,6 +9,9 @@ import { newCanvas, pictureAt } from "./scene.js";
 /** @typedef {import("./types.js").Shot} Shot */
 /** @typedef {{picture?: ImageBitmap, light?: Uint8ClampedArray | null}} Loaded what a record's files hold */
 
+const ORIGIN_COLORS = [[0, 0, 0], [20, 90, 220], [220, 30, 30]]; // drawn, mirrored, guessed
+const HATCH = 6; // pixels of the map of origins from stripe to stripe
+
 /**
  * @param {HTMLCanvasElement} canvas
  * @param {Scene} scene
@@ -74,13 +77,26 @@ export function createPainter(canvas, scene, blob, ask) {
     const factor = (2 * reach * camera.scale) / (fill * size * (1 + camera.k * depth));
     const [left, top, width, height] = record.box;
     context.imageSmoothingQuality = "high";
-    context.drawImage(
-      pictureOf(record, files, shot),
+    /** @type {[number, number, number, number]} */
+    const place = [
       u + (left - size / 2) * factor,
       v + (top - size / 2) * factor * camera.aspect,
       width * factor,
       height * factor * camera.aspect,
-    );
+    ];
+    context.drawImage(pictureOf(record, files, shot), ...place);
+    if (shot.origins && record.origins) context.drawImage(hatched(record.origins), ...place);
+  }
+
+  /** @param {{size: number[], map: import("./types.js").Range}} origins @returns {HTMLCanvasElement} */
+  function hatched({ size: [width, height], map: [start, length] }) {
+    const map = blob.subarray(start, start + length);
+    const pixels = new ImageData(width, height);
+    map.forEach((origin, i) => {
+      const bright = ((i % width) + Math.floor(i / width)) % HATCH < HATCH / 2;
+      if (origin) pixels.data.set([...ORIGIN_COLORS[origin], bright ? 230 : 120], 4 * i);
+    });
+    return newCanvas(width, height, (context) => context.putImageData(pixels, 0, 0));
   }
 
   /** @param {Shot} shot */
@@ -108,6 +124,12 @@ export function createPainter(canvas, scene, blob, ask) {
       const record = recordOf(shot);
       const files = record ? await load(record) : {};
       return newCanvas(1, 1, ({ canvas: own }) => put(own, shot, record, files));
+    },
+
+    /** @param {number} sight @returns {number[]} shares of a view that are mirrored, and guessed */
+    originsOf(sight) {
+      const { mirrored, guessed } = scene.sights[sight].layers[scene.layers[0]]?.origins ?? { mirrored: 0, guessed: 0 };
+      return [mirrored, guessed];
     },
 
     /** Read what turning needs, one view after the other. */

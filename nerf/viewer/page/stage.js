@@ -30,8 +30,9 @@ const SIDES = [
  * @returns {Shot}
  */
 export function shotOf(scene, state) {
-  const { layer, colors, lines, ink: pen } = state;
-  return { camera: shownCamera(scene, state), sight: shownSight(scene, state), layer, colors, pen, lines };
+  const { layer, colors, lines, origins, ink: pen } = state;
+  const [camera, sight] = [shownCamera(scene, state), shownSight(scene, state)];
+  return { camera, sight, layer, colors, pen, lines, origins };
 }
 
 /**
@@ -106,6 +107,7 @@ function looksOther(state, old) {
     "snapped",
     "comparison",
     "cameras",
+    "origins",
     "size",
   ];
   return seen.some((name) => state[name] !== old[name]);

@@ -12,7 +12,7 @@
  * @property {number} aspect fy / fx
  */
 
-/** @typedef {"drawn" | "rgb" | "palette" | "normal" | "depth" | "source" | "mannequin"} Layer */
+/** @typedef {"drawn" | "rgb" | "palette" | "normal" | "depth" | "mannequin"} Layer */
 
 /** @typedef {[number, number]} Range where something begins in the blob, and how many bytes it is */
 
@@ -22,6 +22,8 @@
  * @property {number[]} size width and height of the layers
  * @property {Range} maps
  * @property {Range | null} light a WebP picture of how colours differ from their paints
+ * @property {{size: number[], mirrored: number, guessed: number, map: Range} | null} [origins] what no
+ *   drawing shows: a byte per pixel (0 drawn, 1 mirrored, 2 guessed) over the box; and their shares
  * @property {undefined} [picture]
  */
 
@@ -95,6 +97,7 @@
  * @property {number[][]} colors of the palette, as shown: sRGB, 0 to 255
  * @property {number[] | null} pen colour of the lines; null: there are none
  * @property {boolean} lines whether the outline is shown
+ * @property {boolean} origins whether it is shown what no drawing shows
  */
 
 export {};

@@ -23,7 +23,6 @@ from toonset.nerf.viewer.scene import (
     coding,
     layered_record,
     picture_record,
-    smaller,
     webp,
 )
 
@@ -63,10 +62,10 @@ def _sight(yaw: float, elevation: float, level: int, whole: bool) -> dict[str, A
     red, green, blue = PEN
     found = layered(view, np.array(COLORS, np.uint8), Outline((red, green, blue), 0.1 * SIDE))
     layers = {"drawn": layered_record(found)}
-    for i, layer in enumerate(("rgb", "normal", "depth", "source") if whole else ()):
+    for i, layer in enumerate(("rgb", "normal", "depth") if whole else ()):
         grey = np.full((SIDE, SIDE, 1), 40 * i, np.uint8)
         opaque = 255 * (view.alpha > 0.5).astype(np.uint8)
-        layers[layer] = picture_record(smaller(np.dstack([grey, grey, grey, opaque]), 2), 2)
+        layers[layer] = picture_record(np.dstack([grey, grey, grey, opaque])[::2, ::2], 2)
     angles = [math.radians(yaw), math.radians(elevation), 0.0]
     return {"angles": angles, "level": level, "layers": layers}
 
@@ -109,7 +108,7 @@ def figure_scene(**changes: Any) -> tuple[dict[str, Any], bytes]:
     scene = {
         "title": "A figure",
         "verdict": {"state": "weak", "reasons": ["no drawing shows the left side"]},
-        "layers": ["drawn", "rgb", "normal", "depth", "source"],
+        "layers": ["drawn", "rgb", "normal", "depth"],
         "figure": {
             "target": TARGET.tolist(),
             "reach": 1.0,

@@ -25,7 +25,6 @@ from toonset.nerf.train.labelling import label_scene
 from toonset.nerf.training import train
 from toonset.nerf.viewer.build import SheetDrawings, cameras_of, run_page
 from toonset.nerf.viewer.ring import Ring, ring_through
-from toonset.nerf.viewer.scene import smaller
 from toonset.nerf.viewer.sights import SHRINK
 from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.names import hex_of
@@ -36,7 +35,7 @@ SIDE, VIEWS = 160, 12
 NEW = (40, 220, 60)
 NEAR = 0.05  # OKLab: a colour so near to another is its like
 # WebP keeps every other pixel's hue, of which normals of so coarse a field are made
-LEAST_DB = {"drawn": 36.0, "rgb": 33.0, "normal": 27.0, "depth": 33.0, "source": 33.0}
+LEAST_DB = {"drawn": 36.0, "rgb": 33.0, "normal": 27.0, "depth": 33.0}
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,8 +100,6 @@ def at_its_size(layer: str, trained: TrainedField, camera: Camera) -> UInt8[np.n
     """Return a layer as `render` draws it at the size that the page has it at: half, or all."""
     if layer == "drawn":
         return render(trained, camera).picture(layer)
-    if layer == "source":
-        return smaller(render(trained, camera).picture(layer), SHRINK)
     return render(trained, camera.resized(1 / SHRINK)).picture(layer)
 
 
