@@ -127,7 +127,7 @@ export function embedCode(title, hash) {
   frame.setAttribute("title", title);
   frame.setAttribute("width", "480");
   frame.setAttribute("height", "600");
-  frame.setAttribute("style", "border: 0");
+  frame.setAttribute("frameborder", "0"); // the page's policy allows no style attribute
   frame.setAttribute("allow", "fullscreen");
   return frame.outerHTML;
 }

@@ -18,7 +18,7 @@ export function createOrigins(scene, store, sharesOf) {
   /** @param {import("./state.js").State} state */
   function show(state) {
     button.setAttribute("aria-pressed", String(state.origins));
-    words.hidden = !state.origins;
+    words.hidden = !state.origins || button.hidden;
     if (!state.origins) return;
     if (state.layer !== scene.layers[0]) words.textContent = "Choose the first layer to see what is not drawn.";
     else words.textContent = originWords(sharesOf(shownSight(scene, state)));

@@ -94,7 +94,7 @@ export function createPainter(canvas, scene, blob, ask) {
     const pixels = new ImageData(width, height);
     map.forEach((origin, i) => {
       const bright = ((i % width) + Math.floor(i / width)) % HATCH < HATCH / 2;
-      if (origin) pixels.data.set([...ORIGIN_COLORS[origin], bright ? 230 : 120], 4 * i);
+      if (origin) pixels.data.set([...ORIGIN_COLORS[origin], bright ? 170 : 60], 4 * i);
     });
     return newCanvas(width, height, (context) => context.putImageData(pixels, 0, 0));
   }

@@ -87,6 +87,7 @@ function swatchRow(name, share) {
     show(rgb, changed) {
       input.value = code.textContent = hexOf(rgb);
       word.textContent = changed ? `was ${name}` : name;
+      word.classList.toggle("was", changed);
     },
     /** @param {(rgb: number[]) => void} see @param {() => void} keep when it is chosen */
     onColor(see, keep) {

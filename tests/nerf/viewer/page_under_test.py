@@ -13,7 +13,7 @@ import numpy as np
 from playwright.sync_api import Page
 
 from toonset.camera import Camera
-from toonset.nerf.look.blend import DrawnView
+from toonset.nerf.look.blend import DRAWN, GUESSED, MIRRORED, DrawnView
 from toonset.nerf.look.outline import Outline
 from toonset.nerf.viewer.layered import layered
 from toonset.nerf.viewer.page import page_html
@@ -22,6 +22,7 @@ from toonset.nerf.viewer.scene import (
     camera_record,
     coding,
     layered_record,
+    origins_record,
     picture_record,
     webp,
 )
@@ -54,14 +55,16 @@ def drawn_ellipse(camera: Camera) -> DrawnView:
     paint = (np.array(COLORS, np.float32) / 255)[labels]
     line = np.array(PEN, np.float32) / 255
     rgb = paint * (alpha - ink)[..., None] + ink[..., None] * line
-    return DrawnView(rgb, alpha, ink, labels, paint, np.zeros_like(labels))
+    source = np.where(x + 0 * y < 0, np.where(y < 0, MIRRORED, GUESSED), DRAWN).astype(np.uint8)
+    return DrawnView(rgb, alpha, ink, labels, paint, source)
 
 
 def _sight(yaw: float, elevation: float, level: int, whole: bool) -> dict[str, Any]:
     view = drawn_ellipse(sight_camera(yaw, elevation))
     red, green, blue = PEN
     found = layered(view, np.array(COLORS, np.uint8), Outline((red, green, blue), 0.1 * SIDE))
-    layers = {"drawn": layered_record(found)}
+    assert found is not None
+    layers = {"drawn": {**(layered_record(found) or {}), "origins": origins_record(view, found)}}
     for i, layer in enumerate(("rgb", "normal", "depth") if whole else ()):
         grey = np.full((SIDE, SIDE, 1), 40 * i, np.uint8)
         opaque = 255 * (view.alpha > 0.5).astype(np.uint8)

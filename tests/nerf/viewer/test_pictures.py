@@ -13,6 +13,7 @@ from jaxtyping import Bool, UInt8
 from playwright.sync_api import Browser, Page
 
 from bench.view.compare import psnr, shown
+from bench.view.crumbs import left_behind
 from tests.nerf.bodies import Hand, body, sheet
 from tests.nerf.ellipsoids import QUICK
 from toonset.camera import Camera
@@ -127,6 +128,15 @@ def test_another_colour_is_as_render_has_it_and_leaves_nothing_of_the_old(
             left = like(after, old) & (after[..., 3] == 255)
             others = [like(np.array([[rgb]], np.uint8), old)[0, 0] for rgb in colors]
             assert any(others) or not left.any(), (number, i, int(left.sum()))
+
+
+def test_no_paint_leaves_anything_in_a_saved_picture(pages: dict[str, Shown]) -> None:
+    page = pages["field"].page
+    found = list(left_behind(page, (0, 60, 180), (1, 2, 4)))
+    assert {one.paint for one in found} == {str(rgb) for rgb in pages["field"].colors}
+    for one in found:
+        assert one.judged > 1000
+        assert (one.old, one.shining) == (0, 0), one
 
 
 @pytest.mark.parametrize("layer", ["drawn", "palette"])
