@@ -52,8 +52,8 @@ def view(
     if out.suffix.lower() not in (".html", ".htm"):
         raise typer.BadParameter(f"{out}: a page's name ends in .html", param_hint="--out")
     from toonset.errors import BundleError
-    from toonset.palette.names import one_line
     from toonset.nerf.viewer.build import view_html
+    from toonset.palette.names import one_line
     from toonset.read import check_there
     from toonset.write import check_new_file, new_files, write_bytes
 

@@ -102,7 +102,7 @@ def _far_from(paints: Colors) -> list[int]:
 
 
 def _around(picture: Picture, paints: Colors, factor: int) -> Bits:
-    """Return for every pixel a bit per paint that is to be seen around; the last one is anywhere."""
+    """Return for every pixel a bit per paint that shows around; the last one is anywhere."""
     reach = _square(AROUND * factor)
     found = np.zeros(picture.shape[:2], np.int64)
     opaque = picture[..., 3] >= LEAST_ALPHA

@@ -35,7 +35,13 @@ from toonset.nerf.viewer.layered import page_paints
 from toonset.nerf.viewer.page import page_html
 from toonset.nerf.viewer.ring import VIEWS, Ring, ring_through
 from toonset.nerf.viewer.scene import SMALL, Blob, camera_record, coding, webp
-from toonset.nerf.viewer.sights import body_picture, body_sights, figure_sights, layers_of, paints_and_pen
+from toonset.nerf.viewer.sights import (
+    body_picture,
+    body_sights,
+    figure_sights,
+    layers_of,
+    paints_and_pen,
+)
 from toonset.palette.color_names import name_of
 from toonset.palette.palette import Palette
 from toonset.view import SHEET

@@ -107,7 +107,9 @@ def _layer(view: Rendering, layer: str) -> Record | None:
         pen = replace(pen, width_px=pen.width_px * finer)
     found = layered(view.drawn, paints, pen, drawings.drawn_shadow)
     record = layered_record(found)
-    return record and found and {**record, "origins": origins_record(view.drawn, found)}
+    if found is None or record is None:
+        return None
+    return {**record, "origins": origins_record(view.drawn, found)}
 
 
 def _small_layer(small: Rendering, layer: str) -> Record | None:

@@ -112,7 +112,9 @@ def unmixed(
     near = _Near.of(cores, first, labels, there, at, line)
     a, b, t, off = near.best(own, known, line)
     if shadow is not None:  # the same in shadow
-        dark = near.best((own / np.array(shadow.factor)).clip(0, 255).astype(np.float32), known, line)
+        dark = near.best(
+            (own / np.array(shadow.factor)).clip(0, 255).astype(np.float32), known, line
+        )
         a, b, t = (np.where(dark[3] < off, *pair) for pair in zip(dark, (a, b, t), strict=False))
     steps = np.rint(t * PARTS)
     less = steps > PARTS / 2
@@ -176,12 +178,10 @@ class _Near:
     """What lies around some pixels.
 
     Attributes:
-        own: (n,) their labels.
         common: (COMMON, n) the commonest paints around, or fewer.
         count: (COMMON, n) pixels of each in the window.
     """
 
-    own: Int[np.ndarray, " n"]
     common: Int[np.ndarray, "k n"]
     count: Int[np.ndarray, "k n"]
 
@@ -223,7 +223,7 @@ class _Near:
             order.append(most)
             count.append(around[rows, most])
             around[rows, most] = -1
-        return cls(labels.take(at).astype(np.int64), numbers[np.stack(order)], np.stack(count))
+        return cls(numbers[np.stack(order)], np.stack(count))
 
     def best(
         self,
@@ -268,9 +268,7 @@ def _counted(mask: Mask, at: Int[np.ndarray, " n"]) -> Int[np.ndarray, " n"]:
 
 def _counts(mask: Mask) -> UInt8[np.ndarray, "height width"]:
     """Return how many pixels of a mask lie in the window round every pixel."""
-    return np.asarray(
-        cv2.boxFilter(mask.view(np.uint8), -1, (AROUND, AROUND), normalize=False)
-    )
+    return np.asarray(cv2.boxFilter(mask.view(np.uint8), -1, (AROUND, AROUND), normalize=False))
 
 
 def _off_shade(

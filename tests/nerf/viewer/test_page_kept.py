@@ -115,7 +115,7 @@ def test_a_turning_picture_is_saved(open_page: Open, tmp_path: Path) -> None:
 
 TITLES = {
     "مرحبا بالعالم": "مرحبا-بالعالم",
-    "<b>Bold</b> & \"quoted\"": "b-Bold-b-quoted",
+    '<b>Bold</b> & "quoted"': "b-Bold-b-quoted",
     "A dragon 🐉": "A-dragon-🐉",
     "...": "figure",
 }
@@ -132,7 +132,7 @@ def test_a_title_is_shown_and_names_what_is_saved(open_page: Open, title: str) -
 
 
 def test_the_embed_code_shows_the_figure_alone(open_page: Open, tmp_path: Path) -> None:
-    title = "<b>\"me\"</b>"
+    title = '<b>"me"</b>'
     viewer = open_page(scene={"title": title})
     viewer.set(yaw=90)
     copied = "navigator.clipboard.writeText = async (text) => { globalThis.copied = text; }"
