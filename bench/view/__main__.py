@@ -30,7 +30,7 @@ from toonset.palette.names import hex_of
 
 EVERY, FRAMES = 6, 100
 NEW = (40, 220, 60)
-YAWS, FACTORS = (0, 35, 200), (1, 2, 4)  # degrees; sizes of saved pictures
+YAWS, FACTORS = (0, 200), (1, 2, 4)  # degrees; sizes of saved pictures
 FIRST = """new MutationObserver(() => {
   if (document.querySelector("#poster[hidden]")) globalThis.first ??= performance.now();
 }).observe(document, { subtree: true, childList: true, attributes: true })"""

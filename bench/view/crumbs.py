@@ -143,8 +143,10 @@ class _Places:
     ) -> Left:
         """Return what is left of a paint whose colour is another one now."""
         was, found = (one[self.at][:, :3].astype(float) for one in (before, after))
-        off = _off_hulls(found, around[self.at], now)
         own = np.linalg.norm(was - self.paints[number], axis=1) < LIKE
+        seen = own | (was != found).any(axis=1)
+        off = np.zeros(len(was))
+        off[seen] = _off_hulls(found[seen], around[self.at][seen], now)
         same = np.linalg.norm(found - self.paints[number], axis=1) < OLD
         old = own & same & (off > TOLERANCE)
         shining = off > self.off + TOLERANCE
