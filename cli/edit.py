@@ -70,7 +70,8 @@ def edit(
     printer = Printer(as_json, quiet)
     folder = folder_of(place, out)
     body: Any = NO_BODY if str(mesh) == NO_BODY else mesh
-    with Server(folder.resolve().name) as server, hold(folder):
+    title = place.stem if place.is_file() else folder.resolve().name
+    with Server(title) as server, hold(folder):
         session = open_session(place, folder, body, printer.progress, up)
         ended = _ended()
         server.tell_address = lambda address: printer.say(f"for another tab: {address}")

@@ -28,6 +28,15 @@ def view(
             show_default=False,
         ),
     ] = None,
+    title: Annotated[
+        str,
+        typer.Option(
+            "--title",
+            metavar="TEXT",
+            help="Title of the page and name of what it saves (default: the sheet's name).",
+            show_default=False,
+        ),
+    ] = "",
     force: ForceFlag = False,
     as_json: JsonFlag = False,
     quiet: QuietFlag = False,
@@ -44,13 +53,14 @@ def view(
         raise typer.BadParameter(f"{out}: a page's name ends in .html", param_hint="--out")
     from toonset.errors import BundleError
     from toonset.nerf.viewer.build import view_html
+    from toonset.palette.names import one_line
     from toonset.read import check_there
     from toonset.write import check_new_file, new_files, write_bytes
 
     check_there([folder], "run or bundle", BundleError)
     check_new_file(out, force=force)
     printer.progress("drawing all views of the page")
-    data = view_html(folder, size).encode("utf-8")
+    data = view_html(folder, size, one_line(title)).encode("utf-8")
     with new_files(out, force=force) as new:
         write_bytes(new / out.name, data)
     printer.result(

@@ -17,6 +17,7 @@ import typer
 from playwright.sync_api import Page
 
 from bench.view.compare import chromium, psnr, shown
+from bench.view.crumbs import left_behind
 from toonset.camera import Camera
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.render.recolor import recolor_run
@@ -29,6 +30,7 @@ from toonset.palette.names import hex_of
 
 EVERY, FRAMES = 6, 100
 NEW = (40, 220, 60)
+YAWS, FACTORS = (0, 200), (1, 2, 4)  # degrees; sizes of saved pictures
 FIRST = """new MutationObserver(() => {
   if (document.querySelector("#poster[hidden]")) globalThis.first ??= performance.now();
 }).observe(document, { subtree: true, childList: true, attributes: true })"""
@@ -75,6 +77,18 @@ def _pictures(page: Page, trained: TrainedField, seconds: float) -> None:
     old = trained.palette.tolist()
     changed = recolor_run(trained, [f"{hex_of(tuple(old[0]))}={hex_of(NEW)}"])
     _compare(page, changed, cameras, layer, colors=[list(NEW), *old[1:]])
+    _left(page)
+
+
+def _left(page: Page) -> None:
+    """Print what recolouring each paint leaves in saved pictures."""
+    found = list(left_behind(page, YAWS, FACTORS))
+    for factor in FACTORS:
+        own = [one for one in found if one.factor == factor]
+        judged, old, shining = (
+            sum(getattr(one, name) for one in own) for name in ("judged", "old", "shining")
+        )
+        print(f"  {factor}x: of {judged} pixels {old} keep an old colour, {shining} shine")
 
 
 def _compare(

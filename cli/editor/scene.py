@@ -17,6 +17,7 @@ from toonset.camera import Camera
 from toonset.dataset.bundle.bundle import CALIBRATION, LABELS, mannequin_of
 from toonset.dataset.bundle.calibration_file import read_calibration
 from toonset.dataset.bundle.calibration_schema import ViewRecord
+from toonset.dataset.bundle.palette_files import palette_title
 from toonset.dataset.bundle.transforms_read import member, place_in
 from toonset.dataset.images.picture import decode_rgba, encode_grey_png
 from toonset.dataset.split_folder.load import Sheet
@@ -61,7 +62,7 @@ def scene_of(folder: Path, sheet: Sheet) -> dict[str, Any]:
     mesh = mannequin_of(folder)
     return {
         "schema": "toonset-edit/1",
-        "title": folder.resolve().name,
+        "title": palette_title([source.name], folder),
         "sheet": {
             "name": source.name,
             "sha256": source.sha256,

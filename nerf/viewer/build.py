@@ -17,6 +17,7 @@ from toonset.camera import Camera
 from toonset.dataset.bundle.bundle import CALIBRATION, Bundle, read_bundle
 from toonset.dataset.bundle.calibration_file import read_calibration
 from toonset.dataset.bundle.calibration_schema import ViewRecord
+from toonset.dataset.bundle.palette_files import palette_title
 from toonset.dataset.bundle.read_scene import read_palette_of
 from toonset.dataset.bundle.transforms_read import member
 from toonset.dataset.silhouettes.mask import alpha_of, has_figure
@@ -30,12 +31,20 @@ from toonset.nerf.look.drawings import Original
 from toonset.nerf.render.turntable import FILL, drawn_on_sheet, filled_box, framed
 from toonset.nerf.render.views import render
 from toonset.nerf.run.folder import CONFIG, read_field
+from toonset.nerf.viewer.layered import page_paints
 from toonset.nerf.viewer.page import page_html
 from toonset.nerf.viewer.ring import VIEWS, Ring, ring_through
 from toonset.nerf.viewer.scene import SMALL, Blob, camera_record, coding, webp
-from toonset.nerf.viewer.sights import body_picture, body_sights, figure_sights, layers_of
+from toonset.nerf.viewer.sights import (
+    body_picture,
+    body_sights,
+    figure_sights,
+    layers_of,
+    paints_and_pen,
+)
 from toonset.palette.color_names import name_of
 from toonset.palette.palette import Palette
+from toonset.view import SHEET
 
 FIGURE_PX = 400  # height of the figure, unless told otherwise
 HULL_VOXELS = 72  # along the longest side of a bundle's hull
@@ -70,7 +79,7 @@ class SheetDrawings:
         return cls([d.camera for d in drawings], [d.rgba for d in drawings], said)
 
 
-def view_html(folder: Path, size: int | None = None) -> str:
+def view_html(folder: Path, size: int | None = None, title: str = "") -> str:
     """Return the page of a run folder, or of a bundle.
 
     A bundle that holds a run shows that; one that is not trained yet shows its drawings, its
@@ -79,16 +88,19 @@ def view_html(folder: Path, size: int | None = None) -> str:
     Args:
         folder: of the run or bundle.
         size: side of the views' pictures, px; None: the figure is FIGURE_PX high.
+        title: of the page; "": the sheet's name, or the folder's where the sheet is not known.
 
     Raises:
         ToonsetError: a file is missing or damaged.
     """
     runs = [place for place in (folder, folder / "run") if (place / CONFIG).is_file()]
     with working_threads():
-        return _run_html(runs[0], size) if runs else _bundle_html(read_bundle(folder), size)
+        if runs:
+            return _run_html(runs[0], size, title)
+        return _bundle_html(read_bundle(folder), size, title)
 
 
-def _run_html(run: Path, size: int | None) -> str:
+def _run_html(run: Path, size: int | None, title: str) -> str:
     trained = read_field(run)
     beside = run.resolve().parent
     in_bundle = (beside / CALIBRATION).is_file()
@@ -96,7 +108,7 @@ def _run_html(run: Path, size: int | None) -> str:
     metrics = run / METRICS
     verdict = read_json(metrics).get("verdict") if metrics.is_file() else None
     about = {
-        "title": beside.name if in_bundle else run.resolve().name,
+        "title": title or _title(beside if in_bundle else run),
         "verdict": verdict and {"state": verdict["verdict"], "reasons": verdict["reasons"]},
         "palette": _paints(trained.palette, palette),
     }
@@ -126,7 +138,7 @@ def run_page(
         **about,
         "layers": layers,
         "pen": drawings and drawings.pen and {"rgb": list(drawings.pen.rgb)},
-        "paints": [] if drawings is None else drawings.paints.tolist(),
+        "paints": [] if drawings is None else page_paints(*paints_and_pen(drawings)).tolist(),
     }
     start = render(trained, cameras[ring.start])
     sights = figure_sights(trained, cameras, ring.layered, start)
@@ -141,7 +153,14 @@ def cameras_of(trained: TrainedField, ring: Ring, size: int | None = None) -> tu
     return framed(trained, ring.angles, size)
 
 
-def _bundle_html(bundle: Bundle, size: int | None) -> str:
+def _title(folder: Path) -> str:
+    """Return the name of a bundle's sheet; the folder's where it is not of one sheet."""
+    file = member(folder, CALIBRATION)
+    inputs = read_calibration(file).inputs if file else []
+    return palette_title((one.name for one in inputs if one.role == SHEET), folder)
+
+
+def _bundle_html(bundle: Bundle, size: int | None, title: str) -> str:
     frames = [frame for frame in bundle.scene.frames if has_figure(frame)]
     if not frames:
         raise BundleError(f"{bundle.folder}: no picture shows a figure; there is nothing to view")
@@ -159,7 +178,7 @@ def _bundle_html(bundle: Bundle, size: int | None) -> str:
         for yaw, elevation, roll in ring.angles.tolist()
     ]
     scene: Record = {
-        "title": bundle.folder.resolve().name,
+        "title": title or _title(bundle.folder),
         "verdict": None,
         "palette": [],
         "paints": [],

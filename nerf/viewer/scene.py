@@ -7,19 +7,21 @@ import zlib
 from dataclasses import dataclass, field
 from typing import Any
 
-import cv2
 import numpy as np
 from jaxtyping import UInt8
 from PIL import Image
 
 from toonset.camera import Camera
-from toonset.nerf.viewer.layered import LEVELS, MOVES, PARTS, Layered
+from toonset.nerf.look.blend import DRAWN, GUESSED, MIRRORED, SOLID, DrawnView
+from toonset.nerf.viewer.layered import LEVELS, Layered
+from toonset.nerf.viewer.light import BRIGHTEST, DARKEST, LIGHTEST, MIDDLE, TINT
+from toonset.nerf.viewer.unmix import PARTS
 
 EFFORT = 7  # 9 takes five times as long for 2 %
 QUALITY = 80  # of WebP pictures
 SMALL = {"quality": 60, "alpha_quality": 50}  # of further layers: 60 % of the bytes for 2 dB
-REST_STEP = 2  # levels of 255: how it is kept, since it may be as far off either way
-MIDDLE = 128
+
+ORIGIN_STEP = 2  # pixels of a view for one of its map of what is not drawn
 
 Picture = UInt8[np.ndarray, "height width 4"]
 
@@ -64,9 +66,11 @@ def coding() -> dict[str, Any]:
     return {
         "levels": LEVELS,
         "parts": PARTS,
-        "moves": MOVES.tolist(),
-        "step": REST_STEP,
         "middle": MIDDLE,
+        "darkest": DARKEST,
+        "lightest": LIGHTEST,
+        "brightest": BRIGHTEST,
+        "tint": TINT,
     }
 
 
@@ -74,31 +78,45 @@ def layered_record(view: Layered | None, shrink: int = 1) -> dict[str, Any] | No
     """Return a view's layers: see `page/compose.js`, which puts them together.
 
     `maps` holds, for every pixel row after row, first the paint and then what is to be read of it
-    (alpha 1 whole, 2 soft; 4 ink, 8 soft ink; 16 a mixture; 32 moves otherwise than its paint);
-    then the soft alphas, soft inks, second paints, their parts and the moves of the pixels that
-    have any.
+    (alpha 1 whole, 2 soft; 4 ink, 8 soft ink; 16 a mixture; 32 stays as it is);
+    then the soft alphas, soft inks, second paints and their parts of the pixels that have any.
     """
     if view is None:
         return None
-    there = view.alpha > 0
+    paints, there = view.paints, view.alpha > 0
     soft = there & (view.alpha < LEVELS)
     inked = there & (view.ink == LEVELS)
     lined = there & (view.ink > 0) & ~inked
-    mixed = there & (view.part > 0)
-    other = there & (view.moved > 0)
-    flags = (there & ~soft) + 2 * soft + 4 * inked + 8 * lined + 16 * mixed + 32 * other
-    planes = [view.first, flags.astype(np.uint8)]
-    lists = [
-        *(view.alpha[soft], view.ink[lined], view.second[mixed], view.part[mixed]),
-        view.moved[other],
-    ]
+    mixed = there & (paints.part > 0) & ~inked
+    stays = there & paints.stays & ~inked
+    flags = (there & ~soft) + 2 * soft + 4 * inked + 8 * lined + 16 * mixed + 32 * stays
+    planes = [paints.first, flags.astype(np.uint8)]
+    lists = [view.alpha[soft], view.ink[lined], paints.second[mixed], paints.part[mixed]]
     height, width = view.alpha.shape
-    rest = np.rint(view.rest / REST_STEP + MIDDLE).clip(0, 255).astype(np.uint8)
     return {
         "box": [shrink * side for side in (*view.corner, width, height)],
         "size": [width, height],
         "maps": b"".join(part.tobytes() for part in (*planes, *lists)),
-        "rest": webp(rest) if view.rest.any() else None,
+        "light": None if view.light is None else webp(view.light.picture()),
+    }
+
+
+def origins_record(view: DrawnView, found: Layered) -> dict[str, Any] | None:
+    """Return where no drawing shows a view; None where that is nowhere.
+
+    A byte for ORIGIN_STEP by ORIGIN_STEP pixels of the layers' box: see `page/types.js`.
+    """
+    left, top = found.corner
+    height, width = found.alpha.shape
+    box = (slice(top, top + height, ORIGIN_STEP), slice(left, left + width, ORIGIN_STEP))
+    source = np.where(view.alpha[box] >= SOLID, view.source[box], DRAWN).astype(np.uint8)
+    if not source.any():
+        return None
+    return {
+        "size": [source.shape[1], source.shape[0]],
+        "mirrored": view.share(MIRRORED),
+        "guessed": view.share(GUESSED),
+        "map": source.tobytes(),
     }
 
 
@@ -129,19 +147,3 @@ def webp(
         file, "WEBP", quality=quality, alpha_quality=alpha_quality, method=4
     )
     return file.getvalue()
-
-
-def smaller(picture: Picture, shrink: int) -> Picture:
-    """Return a picture made `shrink` times smaller; transparent pixels lend no colour."""
-    height, width = (-(-side // shrink) for side in picture.shape[:2])
-    room = [
-        (0, shrink * size - side)
-        for size, side in zip((height, width), picture.shape, strict=False)
-    ]
-    whole = np.pad(picture, [*room, (0, 0)])
-    alpha = whole[..., 3:].astype(np.float32)
-    both = cv2.resize(
-        np.dstack([whole[..., :3] * alpha, alpha]), (width, height), interpolation=cv2.INTER_AREA
-    )
-    both[..., :3] /= np.maximum(both[..., 3:], 1e-3)
-    return np.rint(both).clip(0, 255).astype(np.uint8)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -15,13 +16,15 @@ from toonset.dataset.mesh.rasterize import depth_and_normals
 from toonset.mesh import Mesh
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.kernels.threads import side_by_side
+from toonset.nerf.look.drawings import Drawings
+from toonset.nerf.look.outline import Outline
 from toonset.nerf.render.baked import Baked
 from toonset.nerf.render.layers import Rendering, default_layer
 from toonset.nerf.render.views import baked_of, render
 from toonset.nerf.viewer.layered import layered, layered_shares
-from toonset.nerf.viewer.scene import layered_record, picture_record, smaller
+from toonset.nerf.viewer.scene import layered_record, origins_record, picture_record
 
-LAYERS = ("drawn", "rgb", "palette", "normal", "depth", "source")
+LAYERS = ("drawn", "rgb", "palette", "normal", "depth")
 SHRINK = 2  # pixels of the layer that is seen at first for one of the others
 BODY, AMBIENT = (158, 178, 204), 0.55  # sRGB of a plain body, and its light from everywhere
 LIGHT = np.array([-0.4, -0.6, -0.7]) / np.linalg.norm([-0.4, -0.6, -0.7])  # camera axes
@@ -32,10 +35,15 @@ Record = dict[str, Any]
 
 def layers_of(trained: TrainedField) -> list[str]:
     """Return the layers that a figure's page has, the first at the start."""
-    missing = set() if trained.drawings is not None else {"drawn", "source"}
+    missing = set() if trained.drawings is not None else {"drawn"}
     missing |= set() if trained.palette is not None else {"palette"}
     layers = [layer for layer in LAYERS if layer not in missing]
     return sorted(layers, key=lambda layer: layer != default_layer(trained))
+
+
+def paints_and_pen(drawings: Drawings) -> tuple[UInt8[np.ndarray, "paints 3"], Outline | None]:
+    """Return the paints that a page knows beside its lines', and the pen that draws these."""
+    return (drawings.paints if drawings.pen is None else drawings.palette), drawings.pen
 
 
 def figure_sights(
@@ -85,7 +93,7 @@ def _sight(baked: Baked, made: Callable[[], Rendering], layers: Sequence[str]) -
     small = render(baked, view.camera.resized(1 / SHRINK))
     return {
         layers[0]: _layer(view, layers[0]),
-        **{layer: _small_layer(view, small, layer) for layer in layers[1:]},
+        **{layer: _small_layer(small, layer) for layer in layers[1:]},
     }
 
 
@@ -93,16 +101,22 @@ def _layer(view: Rendering, layer: str) -> Record | None:
     drawings = view.field.drawings
     if layer != "drawn" or drawings is None:
         return picture_record(view.picture(layer))
-    pen = None if drawings.pen is None else drawings.pen.rgb
-    return layered_record(layered(view.drawn, drawings.paints, pen, drawings.drawn_shadow))
+    paints, pen = paints_and_pen(drawings)
+    if pen is not None:
+        finer = view.camera.scale / min(one.camera.scale for one in drawings.views)
+        pen = replace(pen, width_px=pen.width_px * finer)
+    found = layered(view.drawn, paints, pen, drawings.drawn_shadow)
+    record = layered_record(found)
+    if found is None or record is None:
+        return None
+    return {**record, "origins": origins_record(view.drawn, found)}
 
 
-def _small_layer(view: Rendering, small: Rendering, layer: str) -> Record | None:
-    """Return a layer of a small view; where paint comes from is told by the view itself."""
+def _small_layer(small: Rendering, layer: str) -> Record | None:
+    """Return a layer of a small view."""
     if layer == "palette" and small.shares is not None:
         return layered_record(layered_shares(small.shares, small.alpha), SHRINK)
-    own = smaller(view.picture(layer), SHRINK) if layer == "source" else small.picture(layer)
-    return picture_record(own, SHRINK)
+    return picture_record(small.picture(layer), SHRINK)
 
 
 def _body_sight(mesh: Mesh, camera: Camera) -> Record:

@@ -11,7 +11,6 @@ export const LAYER_NAMES = {
   palette: "Palette",
   normal: "Normals",
   depth: "Depth",
-  source: "Source",
   mannequin: "Body",
 };
 
@@ -31,7 +30,6 @@ export function createLayers(scene, store) {
   function show(state) {
     group.show(state.layer);
     lines.setAttribute("aria-pressed", String(state.lines));
-    part("sources", HTMLElement).hidden = state.layer !== "source";
   }
   store.listen(show);
   show(store.state);

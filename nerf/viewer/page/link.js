@@ -33,6 +33,7 @@ export function hashOf(scene, state) {
     ["view", String(state.snapped + 1), state.snapped >= 0],
     ["compare", state.comparison, state.snapped >= 0 && state.comparison !== start.comparison],
     ["cameras", "1", state.cameras],
+    ["notdrawn", "1", state.origins],
   ];
   const kept = entries.filter(([, , differs]) => differs);
   return kept.map(([name, value]) => `${name}=${value}`).join("&");
@@ -64,6 +65,7 @@ export function stateOfHash(scene, hash) {
     snapped: scene.views[view - 1] ? view - 1 : -1,
     comparison: comparisonOf(words.get("compare")) ?? start.comparison,
     cameras: words.get("cameras") === "1",
+    origins: words.get("notdrawn") === "1",
   };
 }
 
@@ -71,13 +73,15 @@ export function stateOfHash(scene, hash) {
  * @param {Scene} scene
  * @param {import("./state.js").Store} store
  * @param {() => void} whenRead the state came from a link
+ * @returns {boolean} whether it did at once
  */
 export function createLink(scene, store, whenRead) {
   let timer = 0;
 
   function write() {
     clearTimeout(timer);
-    const hash = hashOf(scene, store.state);
+    const embedded = document.body.classList.contains("embedded") ? "embed=1" : "";
+    const hash = [embedded, hashOf(scene, store.state)].filter(Boolean).join("&");
     const address = location.href.split("#")[0];
     try {
       if (hash !== location.hash.slice(1))
@@ -89,6 +93,7 @@ export function createLink(scene, store, whenRead) {
 
   function read() {
     store.set(stateOfHash(scene, location.hash));
+    document.body.classList.toggle("embedded", new URLSearchParams(location.hash.slice(1)).get("embed") === "1");
     whenRead();
   }
 
@@ -97,11 +102,34 @@ export function createLink(scene, store, whenRead) {
     write();
     copyText(`${location.href.split("#")[0]}#${hashOf(scene, store.state)}`, "The link is copied.");
   });
+  part("copy_embed", HTMLElement).addEventListener("click", () => {
+    const state = hashOf(scene, store.state);
+    copyText(embedCode(scene.title, `embed=1${state && "&"}${state}`), "The embed code is copied.");
+  });
   if (location.hash) read();
   store.listen(() => {
     clearTimeout(timer);
     timer = setTimeout(write, CALM);
   });
+  return [...new URLSearchParams(location.hash.slice(1)).keys()].some((name) => name !== "embed");
+}
+
+/**
+ * @param {string} title
+ * @param {string} hash
+ * @returns {string} HTML that shows the figure on another page; a file is looked for beside that
+ */
+export function embedCode(title, hash) {
+  const page = location.href.split("#")[0];
+  const source = location.protocol === "file:" ? page.slice(page.lastIndexOf("/") + 1) : page;
+  const frame = document.createElement("iframe");
+  frame.setAttribute("src", `${source}#${hash}`);
+  frame.setAttribute("title", title);
+  frame.setAttribute("width", "480");
+  frame.setAttribute("height", "600");
+  frame.setAttribute("frameborder", "0"); // the page's policy allows no style attribute
+  frame.setAttribute("allow", "fullscreen");
+  return frame.outerHTML;
 }
 
 /** @param {number[] | null} rgb @returns {rgb is number[]} */

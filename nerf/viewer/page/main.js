@@ -4,9 +4,11 @@ import { turntableCamera } from "./camera.js";
 import { createCompare } from "./compare.js";
 import { part, say } from "./elements.js";
 import { createFrusta } from "./frusta.js";
+import { createFullScreen } from "./full_screen.js";
 import { createLayers } from "./layers.js";
 import { createLink } from "./link.js";
 import { createOrbit } from "./orbit.js";
+import { createOrigins } from "./origins.js";
 import { createPainter } from "./painter.js";
 import { createPalettePanel } from "./palette_panel.js";
 import { createSave } from "./save.js";
@@ -18,7 +20,7 @@ import { showVerdict } from "./verdict.js";
 
 /** @typedef {import("./types.js").Shot} Shot */
 
-const NEEDS_PICTURES = ["layers", "recolor", "open_palette", "saving", "spin", "lines"];
+const NEEDS_PICTURES = ["layers", "recolor", "open_palette", "saving", "spin", "lines", "origins"];
 const ZOOM_STEP = 1.25;
 
 const scene = readScene();
@@ -29,12 +31,16 @@ part("title", HTMLElement).textContent = scene.title;
 showVerdict(scene.verdict);
 createLayers(scene, store);
 const panel = createPalettePanel(scene, store);
-createLink(scene, store, panel.forget);
+const linked = createLink(scene, store, panel.forget);
+createFullScreen();
 const stage = createStage(view, scene, store);
 const orbit = createOrbit(view, scene, store);
 part("closer", HTMLElement).addEventListener("click", () => orbit.zoom(ZOOM_STEP));
 part("farther", HTMLElement).addEventListener("click", () => orbit.zoom(1 / ZOOM_STEP));
 part("home", HTMLElement).addEventListener("click", orbit.home);
+let touched = false;
+for (const touch of ["pointerdown", "keydown", "wheel"])
+  addEventListener(touch, () => (touched = true), { capture: true, once: true, passive: true });
 addEventListener("pointerdown", ({ target }) => target !== part("message", HTMLElement) && say(""));
 
 const blob = await readBlob().catch(() => null);
@@ -49,11 +55,12 @@ createFrusta(scene, store);
 function start(blob) {
   const painter = createPainter(view, scene, blob, stage.ask);
   createSave(scene, store, painter);
+  createOrigins(scene, store, painter.originsOf);
   stage.use(painter, () => {
     const poster = part("poster", HTMLElement);
     if (poster.hidden) return;
     poster.hidden = true;
-    painter.readAll();
+    painter.readAll().then(() => linked || touched || orbit.showOff());
   });
   const filled = (/** @type {Partial<Shot> & {side?: number}} */ { side = scene.figure.size, ...shot }) => {
     const sight = shot.sight ?? scene.figure.start;
@@ -63,7 +70,9 @@ function start(blob) {
       sight,
       layer: scene.layers[0],
       colors: scene.palette.map((paint) => paint.rgb),
-      ink: scene.pen && scene.pen.rgb,
+      pen: scene.pen && scene.pen.rgb,
+      lines: true,
+      origins: false,
       ...shot,
     };
   };

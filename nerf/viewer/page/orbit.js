@@ -146,8 +146,7 @@ export function createOrbit(stage, scene, store) {
   /** @param {PointerEvent} event */
   function up(event) {
     if (!pointers.delete(event.pointerId) || pointers.size) return;
-    const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
-    if (event.timeStamp - movedAt < STALE && !event.shiftKey && !calm) swingOn(SLOWER);
+    if (event.timeStamp - movedAt < STALE && !event.shiftKey && !calm()) swingOn(SLOWER);
   }
 
   /** @type {Record<string, number[]>} right and down */
@@ -176,6 +175,22 @@ export function createOrbit(stage, scene, store) {
     zoom(Math.exp(-event.deltaY * lines * WHEEL), place(event));
   }
 
+  /** Turn by itself until something is touched. */
+  function showOff() {
+    if (calm()) return;
+    spin();
+    for (const touched of ["pointerdown", "keydown", "wheel"])
+      addEventListener(touched, leave, { capture: true, passive: true });
+  }
+
+  /** @param {Event} event */
+  function leave(event) {
+    for (const touched of ["pointerdown", "keydown", "wheel"])
+      removeEventListener(touched, leave, { capture: true });
+    const { target } = event;
+    if (!(target instanceof Node && spinning.contains(target))) stop(); // the button stops it itself
+  }
+
   spinning.addEventListener("click", spin);
   stage.addEventListener("pointerdown", down);
   stage.addEventListener("pointermove", drag);
@@ -184,5 +199,10 @@ export function createOrbit(stage, scene, store) {
   stage.addEventListener("keydown", key);
   stage.addEventListener("wheel", wheel, { passive: false });
   stage.addEventListener("dblclick", home);
-  return { home, zoom: (/** @type {number} */ factor) => zoom(factor) };
+  return { home, showOff, zoom: (/** @type {number} */ factor) => zoom(factor) };
+}
+
+/** @returns {boolean} whether less motion is wished for */
+function calm() {
+  return matchMedia("(prefers-reduced-motion: reduce)").matches;
 }

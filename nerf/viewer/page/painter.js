@@ -7,7 +7,10 @@ import { newCanvas, pictureAt } from "./scene.js";
 /** @typedef {import("./types.js").LayerRecord} LayerRecord */
 /** @typedef {import("./types.js").Scene} Scene */
 /** @typedef {import("./types.js").Shot} Shot */
-/** @typedef {{picture?: ImageBitmap, rest?: Uint8ClampedArray | null}} Loaded what a record's files hold */
+/** @typedef {{picture?: ImageBitmap, light?: Uint8ClampedArray | null}} Loaded what a record's files hold */
+
+const ORIGIN_COLORS = [[0, 0, 0], [20, 90, 220], [220, 30, 30]]; // drawn, mirrored, guessed
+const HATCH = 6; // pixels of the map of origins from stripe to stripe
 
 /**
  * @param {HTMLCanvasElement} canvas
@@ -36,24 +39,26 @@ export function createPainter(canvas, scene, blob, ask) {
     /** @type {Loaded} */
     const found = record.picture
       ? { picture: await pictureAt(blob, record.picture) }
-      : { rest: record.rest ? pixelsOf(await pictureAt(blob, record.rest)) : null };
+      : { light: record.light ? pixelsOf(await pictureAt(blob, record.light)) : null };
     loaded.set(record, found);
     return found;
   }
 
   /** @param {LayerRecord} record @param {Loaded} files @param {Shot} shot @returns {CanvasImageSource} */
-  function pictureOf(record, files, { colors, ink }) {
+  function pictureOf(record, files, { colors, pen, lines }) {
     if (files.picture) return files.picture;
-    const key = JSON.stringify([colors, ink]);
+    const key = JSON.stringify([colors, pen, lines]);
     if (key !== shown) made.clear();
     shown = key;
     const known = made.get(record);
     if (known) return known;
     const [start, length] = record.maps;
-    const now = [...colors, ...scene.paints.slice(colors.length)];
-    const old = [...scene.palette.map((paint) => paint.rgb), ...scene.paints.slice(scene.palette.length)];
+    const others = scene.paints.slice(colors.length);
+    const old = [...scene.palette.map((paint) => paint.rgb), ...others];
+    const now = [...colors, ...(pen ? [...others.slice(0, -1), pen] : others)];
     const maps = blob.subarray(start, start + length);
-    const pixels = composed(record, maps, files.rest ?? null, { old, now, ink }, scene.coding);
+    const ink = lines ? pen : null;
+    const pixels = composed(record, maps, files.light ?? null, { old, now, ink }, scene.coding);
     const picture = newCanvas(pixels.width, pixels.height, (context) => context.putImageData(pixels, 0, 0));
     made.set(record, picture);
     return picture;
@@ -72,13 +77,26 @@ export function createPainter(canvas, scene, blob, ask) {
     const factor = (2 * reach * camera.scale) / (fill * size * (1 + camera.k * depth));
     const [left, top, width, height] = record.box;
     context.imageSmoothingQuality = "high";
-    context.drawImage(
-      pictureOf(record, files, shot),
+    /** @type {[number, number, number, number]} */
+    const place = [
       u + (left - size / 2) * factor,
       v + (top - size / 2) * factor * camera.aspect,
       width * factor,
       height * factor * camera.aspect,
-    );
+    ];
+    context.drawImage(pictureOf(record, files, shot), ...place);
+    if (shot.origins && record.origins) context.drawImage(hatched(record.origins), ...place);
+  }
+
+  /** @param {{size: number[], map: import("./types.js").Range}} origins @returns {HTMLCanvasElement} */
+  function hatched({ size: [width, height], map: [start, length] }) {
+    const map = blob.subarray(start, start + length);
+    const pixels = new ImageData(width, height);
+    map.forEach((origin, i) => {
+      const bright = ((i % width) + Math.floor(i / width)) % HATCH < HATCH / 2;
+      if (origin) pixels.data.set([...ORIGIN_COLORS[origin], bright ? 170 : 60], 4 * i);
+    });
+    return newCanvas(width, height, (context) => context.putImageData(pixels, 0, 0));
   }
 
   /** @param {Shot} shot */
@@ -106,6 +124,12 @@ export function createPainter(canvas, scene, blob, ask) {
       const record = recordOf(shot);
       const files = record ? await load(record) : {};
       return newCanvas(1, 1, ({ canvas: own }) => put(own, shot, record, files));
+    },
+
+    /** @param {number} sight @returns {number[]} shares of a view that are mirrored, and guessed */
+    originsOf(sight) {
+      const { mirrored, guessed } = scene.sights[sight].layers[scene.layers[0]]?.origins ?? { mirrored: 0, guessed: 0 };
+      return [mirrored, guessed];
     },
 
     /** Read what turning needs, one view after the other. */

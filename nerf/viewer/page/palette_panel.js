@@ -21,9 +21,9 @@ export function createPalettePanel(scene, store) {
 
   /** @param {State} state */
   function show({ colors, ink }) {
-    rows.forEach((row, i) => row.show(colors[i]));
+    rows.forEach((row, i) => row.show(colors[i], !sameColor(colors[i], scene.palette[i].rgb)));
     strip.forEach((stripe, i) => (stripe.style.backgroundColor = hexOf(colors[i])));
-    if (ink) inkRow?.show(ink);
+    if (ink) inkRow?.show(ink, false);
   }
 
   rows.forEach((row, i) =>
@@ -72,19 +72,22 @@ export function createPalettePanel(scene, store) {
 function swatchRow(name, share) {
   const input = element("input", { type: "color" });
   const code = element("code");
+  const word = element("bdi", { class: "name" }, name);
   const label = element(
     "label",
     {},
     input,
-    element("bdi", { class: "name" }, name),
+    word,
     code,
     element("span", { class: "share" }, share),
   );
   return {
     item: element("li", {}, label),
-    /** @param {number[]} rgb */
-    show(rgb) {
+    /** @param {number[]} rgb @param {boolean} changed since its name was given */
+    show(rgb, changed) {
       input.value = code.textContent = hexOf(rgb);
+      word.textContent = changed ? `was ${name}` : name;
+      word.classList.toggle("was", changed);
     },
     /** @param {(rgb: number[]) => void} see @param {() => void} keep when it is chosen */
     onColor(see, keep) {

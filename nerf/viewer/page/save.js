@@ -19,10 +19,11 @@ const FRAME_SIZE = 480; // pixels
  */
 export function createSave(scene, store, painter) {
   const [button, progress] = [part("save_turn", HTMLButtonElement), part("progress", HTMLProgressElement)];
+  const words = part("progress_words", HTMLElement);
   let running = false;
 
   async function savePng() {
-    const shot = shotOf(scene, { ...store.state, cameras: false, comparison: "slider" });
+    const shot = shotOf(scene, { ...store.state, cameras: false, origins: false, comparison: "slider" });
     const css = part("stage", HTMLElement).clientWidth / shot.camera.size[0];
     const factor = Number(part("factor", HTMLSelectElement).value) * css;
     const camera = resized(shot.camera, factor);
@@ -38,9 +39,10 @@ export function createSave(scene, store, painter) {
     /** @type {Blob[]} */
     const files = [];
     const size = [FRAME_SIZE, FRAME_SIZE];
-    const state = { ...store.state, snapped: -1, cameras: false, zoom: 1, pan: [0, 0], size };
+    const state = { ...store.state, snapped: -1, cameras: false, origins: false, zoom: 1, pan: [0, 0], size };
     for (let i = 0; i < TURN_FRAMES && running; i++) {
       progress.value = i;
+      words.textContent = `${i + 1} of ${TURN_FRAMES}`;
       const shot = shotOf(scene, { ...state, yaw: state.yaw + (360 * i) / TURN_FRAMES });
       files.push(await encoded(await painter.read(shot)));
       await new Promise((resolve) => setTimeout(resolve)); // input comes in between
@@ -66,6 +68,7 @@ export function createSave(scene, store, painter) {
     await guarded(saveTurn);
     running = false;
     progress.hidden = true;
+    words.textContent = "";
     button.textContent = "Save turntable";
   });
 }
@@ -91,10 +94,6 @@ function download(file, name) {
 
 /** @param {string} title @returns {string} */
 function fileName(title) {
-  return (
-    title
-      .replace(/[^\p{L}\p{N}]+/gu, "-")
-      .replace(/^-|-$/g, "")
-      .slice(0, 40) || "figure"
-  );
+  const words = title.replace(/[^\p{L}\p{M}\p{N}\p{Extended_Pictographic}]+/gu, "-").replace(/^-|-$/g, "");
+  return Array.from(words).slice(0, 40).join("") || "figure";
 }

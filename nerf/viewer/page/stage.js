@@ -30,9 +30,9 @@ const SIDES = [
  * @returns {Shot}
  */
 export function shotOf(scene, state) {
-  const { layer, colors, lines } = state;
-  const ink = lines ? state.ink : null;
-  return { camera: shownCamera(scene, state), sight: shownSight(scene, state), layer, colors, ink };
+  const { layer, colors, lines, origins, ink: pen } = state;
+  const [camera, sight] = [shownCamera(scene, state), shownSight(scene, state)];
+  return { camera, sight, layer, colors, pen, lines, origins };
 }
 
 /**
@@ -107,6 +107,7 @@ function looksOther(state, old) {
     "snapped",
     "comparison",
     "cameras",
+    "origins",
     "size",
   ];
   return seen.some((name) => state[name] !== old[name]);

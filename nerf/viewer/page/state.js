@@ -19,6 +19,7 @@
  * @property {number} split share of the stage that shows the drawing
  * @property {number} onion opacity of the drawing
  * @property {boolean} cameras whether they are drawn round the figure
+ * @property {boolean} origins whether it is shown what no drawing shows
  * @property {number[]} size of the stage, canvas pixels
  */
 
@@ -56,6 +57,7 @@ export function startState(scene) {
     split: 0.5,
     onion: 0.5,
     cameras: false,
+    origins: false,
     size: [400, 400],
   };
 }

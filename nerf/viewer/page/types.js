@@ -12,7 +12,7 @@
  * @property {number} aspect fy / fx
  */
 
-/** @typedef {"drawn" | "rgb" | "palette" | "normal" | "depth" | "source" | "mannequin"} Layer */
+/** @typedef {"drawn" | "rgb" | "palette" | "normal" | "depth" | "mannequin"} Layer */
 
 /** @typedef {[number, number]} Range where something begins in the blob, and how many bytes it is */
 
@@ -21,11 +21,13 @@
  * @property {number[]} box left, top, width and height in the view, its pixels
  * @property {number[]} size width and height of the layers
  * @property {Range} maps
- * @property {Range | null} rest a WebP picture of what the paints do not explain
+ * @property {Range | null} light a WebP picture of how colours differ from their paints
+ * @property {{size: number[], mirrored: number, guessed: number, map: Range} | null} [origins] what no
+ *   drawing shows: a byte per pixel (0 drawn, 1 mirrored, 2 guessed) over the box; and their shares
  * @property {undefined} [picture]
  */
 
-/** @typedef {{box: number[], picture: Range, maps?: any, rest?: any, size?: any}} PictureRecord a WebP picture */
+/** @typedef {{box: number[], picture: Range, maps?: any, light?: any, size?: any}} PictureRecord a WebP picture */
 
 /** @typedef {any} LayerRecord a `LayeredRecord` or a `PictureRecord` */
 
@@ -33,9 +35,11 @@
  * @typedef {object} Coding how a `LayeredRecord` is to be read
  * @property {number} levels of alpha and ink, from nothing to all
  * @property {number} parts of a mixture
- * @property {number[]} moves how far a colour may move with its paints
- * @property {number} step of `rest`, levels of 255
- * @property {number} middle of `rest`: nothing
+ * @property {number} middle the level of `light` that changes nothing: see nerf/viewer/light.py
+ * @property {number} darkest the level of black
+ * @property {number} lightest the level of white
+ * @property {number} brightest the largest gain
+ * @property {number} tint levels of a colour for one of `light`
  */
 
 /**
@@ -78,7 +82,7 @@
  * @property {Layer[]} layers that can be shown, the first at the start
  * @property {Figure} figure
  * @property {Paint[]} palette
- * @property {number[][]} paints of the drawn look: the palette's, then others that stay
+ * @property {number[][]} paints of the drawn look: the palette's, the lines', if there are any
  * @property {Coding} coding
  * @property {{rgb: number[]} | null} pen that draws the lines
  * @property {ViewRecord[]} views
@@ -91,7 +95,9 @@
  * @property {number} sight the view that stands for it
  * @property {Layer} layer
  * @property {number[][]} colors of the palette, as shown: sRGB, 0 to 255
- * @property {number[] | null} ink colour of the lines, as shown; null: without lines
+ * @property {number[] | null} pen colour of the lines; null: there are none
+ * @property {boolean} lines whether the outline is shown
+ * @property {boolean} origins whether it is shown what no drawing shows
  */
 
 export {};

@@ -13,14 +13,18 @@ export const VERDICTS = {
   "": { icon: "–", word: "not rated", means: "No calibration says how certain this camera is." },
 };
 
+const RUN_WORDS = new Map([
+  ["ok", "The views fit the drawings"],
+  ["weak", "Some views may look wrong"],
+]);
+
 /**
  * @param {{state: string, reasons: string[]} | null} verdict of the run
  */
 export function showVerdict(verdict) {
   const place = part("verdict", HTMLElement);
   if (!verdict) return;
-  const known = VERDICTS[verdict.state];
-  place.append(badge(verdict.state, `Run ${known ? known.word : verdict.state}`));
+  place.append(badge(verdict.state, RUN_WORDS.get(verdict.state) ?? verdict.state));
   if (verdict.reasons.length) {
     const reasons = verdict.reasons.map((reason) => element("li", { dir: "auto" }, reason));
     place.append(element("ul", {}, ...reasons));

@@ -13,7 +13,8 @@ import numpy as np
 from playwright.sync_api import Page
 
 from toonset.camera import Camera
-from toonset.nerf.look.blend import DrawnView
+from toonset.nerf.look.blend import DRAWN, GUESSED, MIRRORED, DrawnView
+from toonset.nerf.look.outline import Outline
 from toonset.nerf.viewer.layered import layered
 from toonset.nerf.viewer.page import page_html
 from toonset.nerf.viewer.scene import (
@@ -21,8 +22,8 @@ from toonset.nerf.viewer.scene import (
     camera_record,
     coding,
     layered_record,
+    origins_record,
     picture_record,
-    smaller,
     webp,
 )
 
@@ -54,18 +55,20 @@ def drawn_ellipse(camera: Camera) -> DrawnView:
     paint = (np.array(COLORS, np.float32) / 255)[labels]
     line = np.array(PEN, np.float32) / 255
     rgb = paint * (alpha - ink)[..., None] + ink[..., None] * line
-    return DrawnView(rgb, alpha, ink, labels, paint, np.zeros_like(labels))
+    source = np.where(x + 0 * y < 0, np.where(y < 0, MIRRORED, GUESSED), DRAWN).astype(np.uint8)
+    return DrawnView(rgb, alpha, ink, labels, paint, source)
 
 
 def _sight(yaw: float, elevation: float, level: int, whole: bool) -> dict[str, Any]:
     view = drawn_ellipse(sight_camera(yaw, elevation))
     red, green, blue = PEN
-    found = layered(view, np.array(COLORS, np.uint8), (red, green, blue))
-    layers = {"drawn": layered_record(found)}
-    for i, layer in enumerate(("rgb", "normal", "depth", "source") if whole else ()):
+    found = layered(view, np.array(COLORS, np.uint8), Outline((red, green, blue), 0.1 * SIDE))
+    assert found is not None
+    layers = {"drawn": {**(layered_record(found) or {}), "origins": origins_record(view, found)}}
+    for i, layer in enumerate(("rgb", "normal", "depth") if whole else ()):
         grey = np.full((SIDE, SIDE, 1), 40 * i, np.uint8)
         opaque = 255 * (view.alpha > 0.5).astype(np.uint8)
-        layers[layer] = picture_record(smaller(np.dstack([grey, grey, grey, opaque]), 2), 2)
+        layers[layer] = picture_record(np.dstack([grey, grey, grey, opaque])[::2, ::2], 2)
     angles = [math.radians(yaw), math.radians(elevation), 0.0]
     return {"angles": angles, "level": level, "layers": layers}
 
@@ -108,7 +111,7 @@ def figure_scene(**changes: Any) -> tuple[dict[str, Any], bytes]:
     scene = {
         "title": "A figure",
         "verdict": {"state": "weak", "reasons": ["no drawing shows the left side"]},
-        "layers": ["drawn", "rgb", "normal", "depth", "source"],
+        "layers": ["drawn", "rgb", "normal", "depth"],
         "figure": {
             "target": TARGET.tolist(),
             "reach": 1.0,
@@ -122,7 +125,7 @@ def figure_scene(**changes: Any) -> tuple[dict[str, Any], bytes]:
             {"name": name, "rgb": rgb, "share": share}
             for name, rgb, share in zip(names, COLORS, (0.6, 0.3, 0.1), strict=True)
         ],
-        "paints": list(COLORS),
+        "paints": [*COLORS, PEN],
         "coding": coding(),
         "pen": {"rgb": PEN},
         "views": views,

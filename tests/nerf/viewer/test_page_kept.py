@@ -113,6 +113,64 @@ def test_a_turning_picture_is_saved(open_page: Open, tmp_path: Path) -> None:
     assert viewer.page.get_by_role("button", name="Save turntable").is_visible()
 
 
+TITLES = {
+    "مرحبا بالعالم": "مرحبا-بالعالم",
+    '<b>Bold</b> & "quoted"': "b-Bold-b-quoted",
+    "A dragon 🐉": "A-dragon-🐉",
+    "...": "figure",
+}
+
+
+@pytest.mark.parametrize("title", TITLES)
+def test_a_title_is_shown_and_names_what_is_saved(open_page: Open, title: str) -> None:
+    viewer = open_page(scene={"title": title})
+    assert viewer.page.locator("h1").inner_text() == title
+    assert viewer.page.title() == title
+    with viewer.page.expect_download() as download:
+        viewer.page.get_by_role("button", name="Save PNG").click()
+    assert download.value.suggested_filename == f"{TITLES[title]}.png"
+
+
+def test_the_embed_code_shows_the_figure_alone(open_page: Open, tmp_path: Path) -> None:
+    title = '<b>"me"</b>'
+    viewer = open_page(scene={"title": title})
+    viewer.set(yaw=90)
+    copied = "navigator.clipboard.writeText = async (text) => { globalThis.copied = text; }"
+    viewer.page.evaluate(f"() => {{ {copied} }}")
+    viewer.page.get_by_role("button", name="Copy embed code").click()
+    viewer.page.wait_for_function("globalThis.copied")
+    code = viewer.page.evaluate("copied")
+    (tmp_path / "host.html").write_text(f"<!doctype html><p>host</p>{code}", encoding="utf-8")
+    page = viewer.page.context.new_page()
+    page.goto((tmp_path / "host.html").as_uri())
+    assert page.locator("iframe").get_attribute("title") == title
+    frame = page.frame_locator("iframe")
+    frame.locator("#poster[hidden]").wait_for(state="attached")
+    assert frame.locator("#view").is_visible()
+    for other in ("header", ".tools", "#timeline", "#help"):
+        assert frame.locator(other).first.is_hidden(), other
+    inner = page.frames[1]
+    assert inner.evaluate("toonset.store.state.yaw") == 90
+    assert inner.evaluate("document.documentElement.scrollHeight") == 600
+
+
+def test_a_page_that_nobody_may_write_works(open_page: Open, tmp_path: Path) -> None:
+    viewer = open_page()
+    for place, mode in ((tmp_path / "page.html", 0o444), (tmp_path, 0o555)):
+        place.chmod(mode)
+    try:
+        viewer.page.reload()
+        viewer.page.wait_for_selector("#poster[hidden]", state="attached")
+        viewer.set(yaw=30)
+        viewer.rest()
+        assert viewer.page.evaluate("location.hash") == "#yaw=30"
+        with viewer.page.expect_download() as download:
+            viewer.page.get_by_role("button", name="Save PNG").click()
+        assert download.value.path().stat().st_size > 0
+    finally:
+        tmp_path.chmod(0o755)
+
+
 # What may go wrong
 
 

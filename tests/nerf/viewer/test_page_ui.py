@@ -177,7 +177,7 @@ def test_layers_are_a_radio_group_and_a_recoloured_paint_is_undone(open_page: Op
     page.get_by_role("radio", name="Drawn").check()
     viewer.rest()
     assert viewer.pixel(0.5, 0.6) == [0, 255, 0, 255]
-    assert viewer.shot["ink"] == [0, 0, 255]
+    assert viewer.shot["pen"] == [0, 0, 255]
     page.get_by_role("button", name="Undo").click()
     assert viewer.state["ink"] == PEN
     assert viewer.state["colors"][0] == [0, 255, 0]
@@ -266,6 +266,91 @@ def test_broken_palettes_are_refused_in_one_line(open_page: Open) -> None:
         assert "\n" not in said
         assert "taken" not in said
         assert viewer.state["colors"] == list(COLORS), name
+
+
+def test_a_long_palette_gives_what_is_needed_and_says_so(open_page: Open) -> None:
+    viewer = open_page()
+    many = "".join(f"{i:06x}\n" for i in range(300)).encode()
+    said = viewer.drop("many.hex", many)
+    assert said == "many.hex: 300 colours for 3 paints; the rest is not used."
+    assert viewer.state["colors"] == [[0, 0, 0], [0, 0, 1], [0, 0, 2]]
+
+
+def test_a_changed_paint_has_no_name_of_its_old_colour(open_page: Open) -> None:
+    viewer = open_page()
+    names = viewer.page.locator("#swatches .name")
+    viewer.page.get_by_label("red").fill("#00ff00")
+    assert names.all_inner_texts()[:3] == ["was red", "teal", "gold"]
+    viewer.page.get_by_role("button", name="Undo").click()
+    assert names.all_inner_texts()[0] == "red"
+
+
+def test_what_no_drawing_shows_is_marked_when_asked(open_page: Open) -> None:
+    viewer = open_page()
+    spots = [(0.45, 0.4), (0.45, 0.6), (0.55, 0.6)]
+    before = [viewer.pixel(*spot) for spot in spots]
+    button = viewer.page.get_by_role("button", name="Not drawn")
+    button.click()
+    viewer.rest()
+    after = [viewer.pixel(*spot) for spot in spots]
+    assert after[0][2] > before[0][2] + 20  # bluer: mirrored
+    assert after[1] != before[1]
+    assert after[2] == before[2]
+    words = viewer.page.locator("#origin_words").inner_text()
+    assert "mirror image of a drawing (blue)" in words
+    assert words.count(" %") == 2
+    assert "0 %" not in words.split()
+    button.click()
+    viewer.rest()
+    assert [viewer.pixel(*spot) for spot in spots] == before
+    assert viewer.page.locator("#origin_words").is_hidden()
+
+
+def test_it_turns_until_it_is_touched(open_page: Open) -> None:
+    viewer = open_page(reduced_motion="no-preference")
+    viewer.page.wait_for_function("toonset.store.state.yaw > 5")
+    viewer.page.locator("h1").click()
+    yaw = viewer.state["yaw"]
+    viewer.page.wait_for_timeout(300)
+    assert viewer.state["yaw"] == yaw
+    button = viewer.page.get_by_role("button", name="Turn", exact=True)
+    assert button.get_attribute("aria-pressed") == "false"
+    still = open_page("#yaw=40", reduced_motion="no-preference")  # a link's view stays
+    still.page.wait_for_timeout(500)
+    assert still.state["yaw"] == 40
+    calm = open_page()
+    calm.page.wait_for_timeout(500)
+    assert calm.state["yaw"] == 0
+
+
+def test_the_turn_button_stops_what_turns_by_itself(open_page: Open) -> None:
+    viewer = open_page(reduced_motion="no-preference")
+    viewer.page.wait_for_function("toonset.store.state.yaw > 5")
+    button = viewer.page.get_by_role("button", name="Turn", exact=True)
+    button.click()
+    assert button.get_attribute("aria-pressed") == "false"
+    yaw = viewer.state["yaw"]
+    viewer.page.wait_for_timeout(300)
+    assert viewer.state["yaw"] == yaw
+
+
+def test_the_stage_fills_the_screen_and_comes_back(open_page: Open) -> None:
+    viewer = open_page()
+    button = viewer.page.get_by_role("button", name="Full screen")
+    button.click()
+    viewer.page.wait_for_function("document.fullscreenElement !== null")
+    viewer.rest()
+    size = viewer.page.evaluate("[innerWidth, innerHeight]")
+    assert viewer.shot["camera"]["size"] == size
+    assert button.get_attribute("aria-pressed") == "true"
+    button.click()
+    viewer.page.wait_for_function("document.fullscreenElement === null")
+
+
+def test_hints_about_keys_are_not_for_phones(open_page: Open) -> None:
+    small = {"viewport": {"width": 360, "height": 740}, "has_touch": True}
+    assert "arrow keys" not in open_page(**small).page.locator("#help").inner_text()
+    assert "arrow keys" in open_page().page.locator("#help").inner_text()
 
 
 # Drawings

@@ -13,6 +13,7 @@ from jaxtyping import Bool, UInt8
 from playwright.sync_api import Browser, Page
 
 from bench.view.compare import psnr, shown
+from bench.view.crumbs import left_behind
 from tests.nerf.bodies import Hand, body, sheet
 from tests.nerf.ellipsoids import QUICK
 from toonset.camera import Camera
@@ -25,7 +26,6 @@ from toonset.nerf.train.labelling import label_scene
 from toonset.nerf.training import train
 from toonset.nerf.viewer.build import SheetDrawings, cameras_of, run_page
 from toonset.nerf.viewer.ring import Ring, ring_through
-from toonset.nerf.viewer.scene import smaller
 from toonset.nerf.viewer.sights import SHRINK
 from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.names import hex_of
@@ -36,7 +36,7 @@ SIDE, VIEWS = 160, 12
 NEW = (40, 220, 60)
 NEAR = 0.05  # OKLab: a colour so near to another is its like
 # WebP keeps every other pixel's hue, of which normals of so coarse a field are made
-LEAST_DB = {"drawn": 36.0, "rgb": 33.0, "normal": 27.0, "depth": 33.0, "source": 33.0}
+LEAST_DB = {"drawn": 36.0, "rgb": 33.0, "normal": 27.0, "depth": 33.0}
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,8 +101,6 @@ def at_its_size(layer: str, trained: TrainedField, camera: Camera) -> UInt8[np.n
     """Return a layer as `render` draws it at the size that the page has it at: half, or all."""
     if layer == "drawn":
         return render(trained, camera).picture(layer)
-    if layer == "source":
-        return smaller(render(trained, camera).picture(layer), SHRINK)
     return render(trained, camera.resized(1 / SHRINK)).picture(layer)
 
 
@@ -130,6 +128,15 @@ def test_another_colour_is_as_render_has_it_and_leaves_nothing_of_the_old(
             left = like(after, old) & (after[..., 3] == 255)
             others = [like(np.array([[rgb]], np.uint8), old)[0, 0] for rgb in colors]
             assert any(others) or not left.any(), (number, i, int(left.sum()))
+
+
+def test_no_paint_leaves_anything_in_a_saved_picture(pages: dict[str, Shown]) -> None:
+    page = pages["field"].page
+    found = list(left_behind(page, (0, 60, 180), (1, 2, 4)))
+    assert {one.paint for one in found} == {str(rgb) for rgb in pages["field"].colors}
+    for one in found:
+        assert one.judged > 1000
+        assert (one.old, one.shining) == (0, 0), one
 
 
 @pytest.mark.parametrize("layer", ["drawn", "palette"])
@@ -163,11 +170,11 @@ def test_lines_are_switched_off(pages: dict[str, Shown]) -> None:
         line = (view.ink > 0.9 * view.alpha) & (view.alpha >= SOLID)
         if i in one.ring.own:  # a drawing's own lines lie a little beside
             continue
-        with_lines, without = shown(one.page, i), shown(one.page, i, ink=None)
+        with_lines, without = shown(one.page, i), shown(one.page, i, lines=False)
         assert like(with_lines, pen.rgb)[line].mean() > 0.9
         assert like(without, pen.rgb)[line].mean() < 0.1
         np.testing.assert_array_equal(with_lines[..., 3], without[..., 3])
-        blue = shown(one.page, i, ink=[0, 0, 255])
+        blue = shown(one.page, i, pen=[0, 0, 255])
         assert like(blue, (0, 0, 255))[line].mean() > 0.9
 
 

@@ -50,6 +50,8 @@ def test_a_bundle_becomes_one_quiet_file(
     text = page.read_text(encoding="utf-8")
     assert len(re.findall("<script", text)) == 3  # numbers, pictures, the modules
     assert "<title>a&lt;" in text
+    assert view(monkeypatch, bundle, "-o", page, "--force", "--title", "<i>my\ntitle</i>") == 0
+    assert "<title>&lt;i&gt;my title&lt;/i&gt;</title>" in page.read_text(encoding="utf-8")
     assert not re.search(r"""(src|href)=["']?(https?:)?//""", text)
     (policy,) = re.findall("""<meta http-equiv=.*content="([^"]*)""", text)
     assert policy.startswith("default-src 'none'")
