@@ -110,8 +110,9 @@ def trace(
     """
     height, width = view.alpha.shape
     by = min(1.0, 1 / enlarged, MOST_PX / max(height, width))
+    smaller = (max(1, round(by * width)), max(1, round(by * height)))
     if by < 1:
-        view = _resized(view, by)
+        view = _resized(view, smaller)
         pen = pen and replace(pen, width_px=pen.width_px * by)
     box = _box(view.alpha >= SOLID)
     if box is None:
@@ -124,17 +125,17 @@ def trace(
     shares = _with_borders(shares, colors, picture)
     colors, of_colors, shares = _with_lines(colors, of_colors, shares, picture, pen)
     corner = np.array([box[1].start, box[0].start])
+    scale = np.array(smaller) / (width, height)  # in whole pixels
     outline = (shares.ink > shares.cover) & (shares.labels != NONE)
     labels = np.where(outline, len(colors) - 1, shares.labels)
     like_pen = (np.linalg.norm(colors - colors[-1], axis=1) < NEAR) & (pen is not None)
     like_pen[-1] = False
     stack = _Stack(colors, tuple(of_colors), like_pen, shares, labels)
-    return Vectors((width, height), stack.regions(corner, by))
+    return Vectors((width, height), stack.regions(corner, scale))
 
 
-def _resized(view: DrawnView, by: float) -> DrawnView:
-    """Return a smaller view."""
-    size = tuple(max(1, round(by * side)) for side in view.alpha.shape[::-1])
+def _resized(view: DrawnView, size: tuple[int, int]) -> DrawnView:
+    """Return a smaller view, `size` wide and high."""
     how = {"labels": cv2.INTER_NEAREST, "source": cv2.INTER_NEAREST}
     return DrawnView(
         *(
@@ -496,12 +497,14 @@ class _Stack:
 
         return sorted(np.flatnonzero(areas).tolist(), key=place)
 
-    def regions(self, corner: Int[np.ndarray, " 2"], by: float) -> tuple[Region, ...]:
+    def regions(
+        self, corner: Int[np.ndarray, " 2"], scale: Float[np.ndarray, " 2"]
+    ) -> tuple[Region, ...]:
         """Return the regions, the lowest first.
 
         Args:
             corner: of the picture in its view.
-            by: pixels of the picture in one of the result.
+            scale: pixels of the picture in one of the result, across and down.
         """
         above = np.ones(len(self.colors), dtype=bool)
         borders: dict[int, list[Points]] = {}
@@ -513,7 +516,7 @@ class _Stack:
         curves = iter(fit_closed(list(itertools.chain.from_iterable(borders.values())), OFF_PX))
         found = []
         for k in order:
-            mine = [curve / by for curve in itertools.islice(curves, len(borders[k]))]
+            mine = [curve / scale for curve in itertools.islice(curves, len(borders[k]))]
             red, green, blue = np.rint(255 * self.colors[k]).astype(int).tolist()
             if mine:
                 shapes = _shapes(borders[k], mine)

@@ -217,6 +217,17 @@ def test_enlarged_views_are_traced_as_large_as_drawn() -> None:
     assert np.abs(picture[..., 3] - large.alpha).mean() < 0.02
 
 
+@pytest.mark.parametrize("enlarged", [1.0, 150 / 100.49, 150 / 100.51])
+def test_what_is_traced_smaller_stays_where_it_is(enlarged: float) -> None:
+    labels = canvas(150)
+    disc(labels, 120, 100, 20, 1)  # far from the corner, where a wrong scale shows
+    vectors = trace(view_of(labels), PAINTS, None, enlarged)
+    cover = shown(vectors)[..., 3]
+    middle = [(np.indices(cover.shape)[axis] + 0.5).ravel() @ cover.ravel() for axis in (1, 0)]
+    place = np.array(middle) / cover.sum()
+    np.testing.assert_allclose(place, (120, 100), atol=OFF_PX)
+
+
 def test_svg_names_groups_and_holds_every_colour_in_one_class() -> None:
     names = ["red & <hot>", 'skin "light"', "teal", "3rd"]
     data = encode_svg(trace(view_of(figure()), PAINTS, None), names, "a < b")
