@@ -89,12 +89,12 @@ def test_colours_are_those_that_were_drawn(ran: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("ran", ["few_views.ipynb"], indirect=True)
-def test_more_drawings_and_no_mirror_images_predict_better(ran: str) -> None:
+def test_more_drawings_predict_better_and_mirror_images_take_nothing_off(ran: str) -> None:
     told = re.findall(r"(\d) drawings, symmetric (\w+): PSNR ([\d.]+) dB, outline ([\d.]+)%", ran)
     scores = {(count, symmetric): (float(p), float(o)) for count, symmetric, p, o in told}
     assert list(scores) == [("4", "off"), ("6", "off"), ("6", "auto")]
     assert scores["6", "off"] > scores["4", "off"]
-    assert scores["6", "off"][1] > scores["6", "auto"][1] + 5
+    assert scores["6", "auto"][1] > scores["6", "off"][1] - 2
     assert "mean of 4: PSNR" in ran
     assert "[_repr_png_ of Run]" in ran
     assert "[_repr_html_ of LeaveOneOut]" in ran

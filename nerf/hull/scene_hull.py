@@ -37,8 +37,7 @@ def hull_of(
         scene: posed pictures.
         options: `missing_views` and `fairing` are used; either asks for a visual hull.
         apart_px: by how much the outlines disagree, root mean square.
-        plane_x: of the body's mirror plane x = const; None: it has none. For sections only: a
-            visual hull takes the scene's mirrored drawings like any other.
+        plane_x: of the body's mirror plane x = const; None: it has none. For sections only.
 
     Raises:
         BundleError: fewer than two views show a figure, or the views share no volume.

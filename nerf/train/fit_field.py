@@ -102,10 +102,9 @@ def fit_field(
         usual = STEPS_ON_SECTIONS
     options = replace(options, steps=usual if options.steps is None else options.steps)
     symmetry = find_symmetry(ready.scene, options.symmetric or scene.symmetric)
-    whole = add_mirrored_views(ready.scene, symmetry)
     clock.append(time.perf_counter())
     tell("carving the hull" if options.carve else "placing the box")
-    hull, evidence = _hull(whole, options, ready, symmetry)
+    hull, evidence = _hull(options, ready, symmetry)
     if options.carve and agree:
         ready = agree_on_paint(ready, _depths(ready, hull), _height(hull))
     scene = at_most(add_mirrored_views(ready.fitted, symmetry), FITTED_PX)
@@ -135,17 +134,19 @@ def fit_field(
 
 
 def _hull(
-    scene: Scene, options: TrainOptions, ready: Prepared, symmetry: Symmetry | None
+    options: TrainOptions, ready: Prepared, symmetry: Symmetry | None
 ) -> tuple[Hull, HullEvidence]:
-    """Return the field's hull, and the evidence for how drawings carve it."""
+    """Return the field's hull, and the evidence for how drawings carve it.
+
+    Mirror images do not carve: they lack what one side alone has. Sections mirror what they need
+    by themselves: a side's outline is the other side's.
+    """
+    scene = ready.scene
     if not options.carve:
         return open_box(scene), NO_EVIDENCE
-    if not ready.compared:
-        # sections mirror what they need by themselves: a side's outline is the other side's
-        plane_x = symmetry.plane_x if symmetry and symmetry.mirrored else None
-        return hull_of(ready.scene, options, plane_x=plane_x)
     if ready.shape is None:
-        return hull_of(scene, options, ready.apart_px)
+        plane_x = symmetry.plane_x if symmetry and symmetry.mirrored else None
+        return hull_of(scene, options, ready.apart_px, plane_x)
     extent = float(np.ptp(ready.shape.vertices, axis=0).max())
     hull = hull_of_shape(ready.shape, extent / per_px(scene, VOXELS_PER_PX, VOXELS))
     return as_stored(hull), NO_EVIDENCE

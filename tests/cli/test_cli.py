@@ -97,7 +97,7 @@ def test_help_is_also_a_word(asked, shown, toonset):
         (["render", "run", "-o", "x", "--turntable", "0"], ["--turntable", "1"]),
         (["render", "run", "-o", "x", "--turntable", "2", "--layer", "z"], ["'z'", "palette"]),
         (["render", "run", "-o", "x", "--turntable", "2", "--format", "gfi"], ["mean 'gif'?"]),
-        (["evaluate", "run"], ["Missing option '--test'"]),
+        (["evaluate", "run"], ["give --test with held-out views, or --leave-one-out"]),
         (["export", "b", "-o", "x"], ["Missing option '--to'. Choose from: colmap", "gltf"]),
         (["export", "b", "-o", "x", "--to", "blendr"], ["Did you mean 'blender'?"]),
         (["render", "r", "-o", "x", "--turntable", "2", "--layer", "palete"], ["mean 'palette'?"]),
