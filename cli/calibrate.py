@@ -315,5 +315,7 @@ def _say_result(found: Calibration, out: Path, printer: Printer) -> None:
         printer.doubt(lying)
     verdict = f"sheet: {found.verdict}" + (f" ({found.reason})" if found.reason else "")
     (printer.say if found.is_certain else printer.doubt)(verdict)
-    after = shlex.join(["toonset", "palette", str(out)])
-    printer.say(f"look at {out / 'overlay.png'}; next: {after}")
+    after = f"next: {shlex.join(['toonset', 'palette', str(out)])}"
+    if found.verdict == "failed":
+        after = "give --views, --mesh or --landmarks: no field comes of these cameras"
+    printer.say(f"look at {out / 'overlay.png'}; {after}")

@@ -90,7 +90,7 @@ def evaluate(
 
     printer = Printer(as_json, quiet)
     if leave_one_out == (test is not None):
-        raise UsageError("evaluate: give --test with held-out views, or --leave-one-out")
+        raise UsageError("give --test with held-out views, or --leave-one-out")
     if test is None:
         _leave_one_out(run, bundle, out, printer, force=force)
         return

@@ -53,6 +53,7 @@ class Request:
 
 def run(request: Request, printer: Printer) -> int:
     """Train, write the run and print the result; return the exit code."""
+    from toonset.dataset.bundle.bundle import failed_cameras
     from toonset.dataset.bundle.read_scene import read_scene
     from toonset.nerf.options import TrainOptions
     from toonset.nerf.run.folder import WRITTEN
@@ -86,6 +87,8 @@ def run(request: Request, printer: Printer) -> int:
     printer.result({"run": request.run, **metrics}, summary(request.run, metrics, printer.verbose))
     stopped = found.training.stopped
     doubts = _doubts(metrics, stopped)
+    if failed := failed_cameras(request.bundle):
+        doubts.insert(0, failed)
     for doubt in doubts:
         printer.doubt(f"{request.run}: {doubt}")
     if stopped == INTERRUPTED:

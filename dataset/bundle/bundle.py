@@ -117,6 +117,18 @@ def _calibration_of(folder: Path) -> CalibrationFile | None:
         return None
 
 
+def failed_cameras(folder: Path) -> str:
+    """Return a sentence about the drawings whose calibration failed; empty if there are none."""
+    found = _calibration_of(folder)
+    failed = [view for view in found.views if view.verdict == "failed"] if found else []
+    if not found or not failed:
+        return ""
+    return (
+        f"no camera fits {len(failed)} of {len(found.views)} drawings: views between them are "
+        "guesses; name the drawings' directions (`calibrate --views`) or use `toonset edit`"
+    )
+
+
 def read_bundle(folder: str | Path) -> Bundle:
     """Return a bundle, or any folder with a transforms.json and RGBA pictures.
 

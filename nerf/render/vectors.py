@@ -42,6 +42,7 @@ LINES = -1  # the paint of lines
 OFF_PX = 0.2  # how far a curve may be off the border that it follows
 MOST_PX = 1600  # longest side: larger views are traced smaller
 NEAR = 0.06  # of colours (Euclidean, channels in [0, 1]): nearer ones count as one
+SAME = 4 / 255  # largest difference of a channel of one that is a paint, but averaged
 STEP = 0.12  # of colours: less between neighbours is no edge
 MIXED = 0.02  # by how much two colours must explain a pixel better than one
 AFAR = 0.03  # the same, if the second is not seen around
@@ -120,6 +121,7 @@ def trace(
     view = DrawnView(*(getattr(view, name)[box] for name in DrawnView.__annotations__))
     picture = _Picture.of(view, pen)
     colors, shares = _explained(picture)
+    colors = _as_paints(colors, paints)
     shares = _without_crumbs(shares, colors, picture.color)
     of_colors = _paints_of(colors, paints, shares.labels, view.labels)
     shares = _with_borders(shares, colors, picture)
@@ -424,6 +426,15 @@ def _with_borders(shares: _Shares, colors: Colors, picture: _Picture) -> _Shares
     clear = (picture.contrast > STEP) & ~dilate(off, 2)
     smooth = cv2.GaussianBlur(clear.astype(np.float32), (0, 0), 1.0)
     return replace(shares, clear=np.where(picture.cover > 1 - MIXED, smooth, 1))
+
+
+def _as_paints(colors: Colors, paints: UInt8[np.ndarray, "paints 3"]) -> Colors:
+    """Return colours, those of them that are a paint but for rounding exactly as it is."""
+    away = np.abs(paints / np.float32(255) - colors[:, None]).max(axis=-1, initial=0)
+    if not away.size:
+        return colors
+    like = away.min(axis=1) < SAME
+    return np.where(like[:, None], paints[away.argmin(axis=1)] / np.float32(255), colors)
 
 
 def _paints_of(

@@ -14,7 +14,7 @@ from jaxtyping import UInt8
 from skimage.measure import marching_cubes
 
 from toonset.camera import Camera
-from toonset.dataset.bundle.bundle import CALIBRATION, Bundle, read_bundle
+from toonset.dataset.bundle.bundle import CALIBRATION, Bundle, failed_cameras, read_bundle
 from toonset.dataset.bundle.calibration_file import read_calibration
 from toonset.dataset.bundle.calibration_schema import ViewRecord
 from toonset.dataset.bundle.palette_files import palette_title
@@ -107,9 +107,11 @@ def _run_html(run: Path, size: int | None, title: str) -> str:
     palette = read_palette_of(beside) if in_bundle else None
     metrics = run / METRICS
     verdict = read_json(metrics).get("verdict") if metrics.is_file() else None
+    failed = failed_cameras(beside) if in_bundle else ""
+    state = verdict and {"state": verdict["verdict"], "reasons": verdict["reasons"]}
     about = {
         "title": title or _title(beside if in_bundle else run),
-        "verdict": verdict and {"state": verdict["verdict"], "reasons": verdict["reasons"]},
+        "verdict": {"state": "failed", "reasons": [failed]} if failed else state,
         "palette": _paints(trained.palette, palette),
     }
     return run_page(trained, about, SheetDrawings.of(drawn_on_sheet(trained), beside), size)

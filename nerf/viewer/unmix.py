@@ -8,6 +8,7 @@ with cores nearby. Blends that happen to look like a third paint have no core an
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -15,11 +16,12 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.palette.palette import Shadow
-from toonset.raster import from_nearest
+from toonset.raster import dilate, from_nearest
 
 PARTS = 16  # of a mixture
 LIKE = 9.0  # levels of 255: a colour so near to its paint is that paint
-AROUND = 7  # pixels, a window's side: paints in it may be in a mixture, the commonest COMMON
+AROUND = 7  # pixels, a window's side: paints in it may be in a mixture, the commonest COMMON; and
+# so far away labels name a paint
 COMMON = 4
 BETTER = 1.15  # a mixture explains a colour so much better, squared, or it is none
 LINELESS = 2.0  # the same of one without the line's colour, where there are lines
@@ -29,6 +31,7 @@ STRANGE = 2.5  # times LIKE: what is not so like it is not that paint
 SHADED = 1.5  # times LIKE: so much worse is a shade of a paint
 DARKEST, BRIGHTEST = 0.3, 1.25  # shades of a paint
 BAND = 7  # pixels of a window that a paint's core has; blends along a border have less
+THREE = np.ones((3, 3), np.uint8)
 TWO = np.ones((2, 2), np.uint8)  # pixels: what is thinner the lossy picture of tints loses
 
 Map = UInt8[np.ndarray, "height width"]
@@ -98,8 +101,11 @@ def unmixed(
         shadow: that the drawings have.
     """
     known = paints.astype(np.float32)
+    named = [_named(labels == number) for number in range(len(paints))]
+    if line is not None:
+        named[line] = np.ones_like(there)
     first, part, stays = labels.copy(), np.zeros_like(labels), np.zeros_like(there)
-    cores = _cores(color, there, known, line)
+    cores = _cores(color, there, known, line, named)
     if shadow is not None:
         cores = _in_light(cores, labels, known * np.array(shadow.factor, np.float32), known)
     settled = np.zeros_like(there)
@@ -110,10 +116,11 @@ def unmixed(
     own = color.reshape(-1, 3)[at].astype(np.float32)
     second = first.copy()
     near = _Near.of(cores, first, labels, there, at, line)
-    a, b, t, off = near.best(own, known, line)
+    around = np.stack([one.take(at) for one in named])
+    a, b, t, off = near.best(own, known, line, around)
     if shadow is not None:  # the same in shadow
         dark = near.best(
-            (own / np.array(shadow.factor)).clip(0, 255).astype(np.float32), known, line
+            (own / np.array(shadow.factor)).clip(0, 255).astype(np.float32), known, line, around
         )
         a, b, t = (np.where(dark[3] < off, *pair) for pair in zip(dark, (a, b, t), strict=False))
     steps = np.rint(t * PARTS)
@@ -133,8 +140,9 @@ def _cores(
     there: Mask,
     known: Float[np.ndarray, "paints 3"],
     line: int | None,
+    named: Sequence[Mask],
 ) -> dict[int, Mask]:
-    """Return the areas that surely are a paint, by its number."""
+    """Return the areas that surely are a paint, by its number: labels near them name it."""
     like = np.zeros(there.shape, np.uint8)
     least = np.where(there, np.float32(LIKE**2), np.float32(-1))
     sure = np.zeros_like(there)
@@ -148,7 +156,7 @@ def _cores(
     cores = {}
     for number in np.unique(like[sure]).tolist():
         own = sure & (like == number)
-        core = own if number == line else own & (_counts(own) >= BAND)
+        core = own if number == line else own & (_counts(own) >= BAND) & named[number]
         if core.any():
             cores[number] = core
     return cores
@@ -230,6 +238,7 @@ class _Near:
         color: Float[np.ndarray, "n 3"],
         known: Float[np.ndarray, "paints 3"],
         line: int | None,
+        named: Bool[np.ndarray, "paints n"],
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return the two paints that explain each colour best, the second's share, how far off.
 
@@ -254,11 +263,18 @@ class _Near:
             a, b = (np.where(better, self.common[n], old) for n, old in ((i, a), (j, b)))
             t, least = np.where(better, share, t), np.where(better, away, least)
         apart = np.stack([_apart(color, paint) for paint in known], axis=1)
+        apart[~named.T] = np.inf
         like = apart.argmin(axis=1)
         off = apart[np.arange(len(color)), like] + (ELSE * LIKE) ** 2
         strange = (off <= (ELSE**2 + STRANGE**2) * LIKE**2) & (off < least)
         a, b = (np.where(strange, like, old) for old in (a, b))
         return a, b, np.where(strange, 0, t), np.where(strange, off, least)
+
+
+def _named(labelled: Mask) -> Mask:
+    """Return where labels name a paint: near areas of it, not near the blends of a border."""
+    area = cv2.morphologyEx(labelled.view(np.uint8), cv2.MORPH_OPEN, THREE)
+    return dilate(area > 0, AROUND)
 
 
 def _counted(mask: Mask, at: Int[np.ndarray, " n"]) -> Int[np.ndarray, " n"]:

@@ -103,7 +103,9 @@ export function createLink(scene, store, whenRead) {
     copyText(`${location.href.split("#")[0]}#${hashOf(scene, store.state)}`, "The link is copied.");
   });
   part("copy_embed", HTMLElement).addEventListener("click", () => {
-    const state = hashOf(scene, store.state);
+    const { snapped, yaw } = store.state; // a drawing beside the figure is no part of it
+    const shown = snapped < 0 ? yaw : scene.views[snapped].yaw;
+    const state = hashOf(scene, { ...store.state, snapped: -1, yaw: shown });
     copyText(embedCode(scene.title, `embed=1${state && "&"}${state}`), "The embed code is copied.");
   });
   if (location.hash) read();

@@ -3,7 +3,6 @@
 import { part } from "./elements.js";
 import { RADIAN, shownCamera, shownSight } from "./framing.js";
 import { LAYER_NAMES } from "./layers.js";
-import { wrapped } from "./state.js";
 
 /** @typedef {import("./types.js").Scene} Scene */
 /** @typedef {import("./types.js").Shot} Shot */
@@ -121,7 +120,7 @@ function looksOther(state, old) {
 function labelOf(scene, state) {
   const [yaw, elevation] = scene.sights[shownSight(scene, state)].angles.map((angle) => angle / RADIAN);
   const drawing = state.snapped < 0 ? "" : `, camera of drawing ${state.snapped + 1}`;
-  const angles = `yaw ${Math.round(wrapped(yaw))}°, elevation ${Math.round(elevation)}°`;
+  const angles = `yaw ${((Math.round(yaw) % 360) + 360) % 360}°, elevation ${Math.round(elevation)}°`;
   return `The figure, ${sideOf(yaw)}, ${angles}${drawing}, layer ${LAYER_NAMES[state.layer]}`;
 }
 

@@ -73,7 +73,7 @@ function drawingButton(view, i, picture) {
  * @returns {string}
  */
 function angleWords({ yaw, sigma }) {
-  const angle = `${Math.round(yaw)}°`; // never "-0°", as toFixed would have it
+  const angle = `${((Math.round(yaw) % 360) + 360) % 360}°`;
   return sigma ? `${angle} ± ${sigma.yaw.toFixed(1)}°` : angle;
 }
 

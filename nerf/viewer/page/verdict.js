@@ -16,6 +16,7 @@ export const VERDICTS = {
 const RUN_WORDS = new Map([
   ["ok", "The views fit the drawings"],
   ["weak", "Some views may look wrong"],
+  ["failed", "Views between drawings are guesses"],
 ]);
 
 /**

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from toonset.dataset.bundle.bundle import failed_cameras
 from toonset.dataset.bundle.check import bundle_problems
 from toonset.dataset.bundle.read_scene import read_contour, read_coverage, read_scene, read_tones
 from toonset.dataset.bundle.transforms_read import read_frames
@@ -243,3 +244,11 @@ def test_a_link_inside_the_bundle_is_followed(place: Path):
     (place / "transforms.json").rename(place / "cameras.json")
     (place / "transforms.json").symlink_to("cameras.json")
     assert problems(place) == []
+
+
+def test_failed_cameras_are_told(place: Path, tmp_path: Path) -> None:
+    edit(place, "calibration.json", lambda c: [v.update(verdict="ok") for v in c["views"]])
+    assert failed_cameras(place) == ""
+    edit(place, "calibration.json", lambda c: c["views"][1].update(verdict="failed"))
+    assert failed_cameras(place).startswith("no camera fits 1 of ")
+    assert failed_cameras(tmp_path) == ""

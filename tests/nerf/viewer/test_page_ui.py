@@ -363,7 +363,7 @@ def test_the_timeline_tells_verdicts_in_words(open_page: Open) -> None:
         ["000.png", "0°", "±", "4.0°", "✓", "ok"],
         ["001.png", "50°", "±", "24.0°", "~", "weak"],
         ["002.png", "180°", "±", "44.0°", "?", "ambiguous"],
-        ["003.png", "-90°", "✕", "failed"],
+        ["003.png", "270°", "✕", "failed"],
     ]
     buttons.nth(1).focus()
     assert viewer.page.locator("#reason").inner_text() == "Drawing 2: why it is weak"
