@@ -64,7 +64,8 @@ def _sight(yaw: float, elevation: float, level: int, whole: bool) -> dict[str, A
     red, green, blue = PEN
     found = layered(view, np.array(COLORS, np.uint8), Outline((red, green, blue), 0.1 * SIDE))
     assert found is not None
-    layers = {"drawn": {**(layered_record(found) or {}), "origins": origins_record(view, found)}}
+    layers: dict[str, Any] = {}
+    layers["drawn"] = {**(layered_record(found) or {}), "origins": origins_record(view, found)}
     for i, layer in enumerate(("rgb", "normal", "depth") if whole else ()):
         grey = np.full((SIDE, SIDE, 1), 40 * i, np.uint8)
         opaque = 255 * (view.alpha > 0.5).astype(np.uint8)
