@@ -8,6 +8,7 @@ from typing import NamedTuple
 from toonset.camera import Camera
 from toonset.dataset.bundle.transforms_camera import camera_of
 from toonset.dataset.bundle.transforms_schema import FrameRecord, TransformsFile, read_records
+from toonset.dataset.images.folder import ENDINGS
 from toonset.errors import BundleError, CameraError
 from toonset.lock import settle
 
@@ -58,8 +59,8 @@ def transforms_file(path: Path) -> Path:
             path = found
         if not path.exists():
             raise BundleError(f"{path}: does not exist; give a bundle folder or a transforms.json")
-        if path.suffix.lower() != ".json":
-            raise BundleError(f"{path}: is no bundle; run `toonset calibrate {path}` first")
+        if path.suffix.lower() in ENDINGS:
+            raise BundleError(f"{path}: is a picture; run `toonset calibrate {path}` first")
     except (OSError, ValueError) as error:  # too long, a loop of links, a NUL
         raise BundleError(f"{str(path)[:80]}: is no file name; correct it") from error
     settle(path.with_name("palette.json"))  # and its maps

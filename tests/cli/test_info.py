@@ -112,6 +112,8 @@ def test_what_is_no_bundle_is_refused(verb, drawn: Path, tmp_path: Path, toonset
     assert "does not exist" in toonset(verb, tmp_path / "nothing").reason
     assert "holds no transforms.json, split.json or config.json" in toonset(verb, tmp_path).reason
     assert "is a picture; name a folder" in toonset(verb, drawn / "sheet.png").reason
+    told = toonset("view", drawn / "sheet.png", "-o", tmp_path / "x.html").reason
+    assert "sheet.png: is a picture; run `toonset calibrate" in told
     (tmp_path / "x.txt").write_text("hello")
     if verb == "info":
         assert "is no valid JSON" in toonset(verb, tmp_path / "x.txt").reason
