@@ -317,5 +317,5 @@ def _say_result(found: Calibration, out: Path, printer: Printer) -> None:
     (printer.say if found.is_certain else printer.doubt)(verdict)
     after = f"next: {shlex.join(['toonset', 'palette', str(out)])}"
     if found.verdict == "failed":
-        after = "give --views, --mesh or --landmarks: no field comes of these cameras"
+        after = "then give --views, --mesh or --landmarks: these cameras are of no use to a field"
     printer.say(f"look at {out / 'overlay.png'}; {after}")

@@ -53,14 +53,13 @@ def view(
         raise typer.BadParameter(f"{out}: a page's name ends in .html", param_hint="--out")
     from toonset.dataset.bundle.transforms_read import transforms_file
     from toonset.errors import BundleError
-    from toonset.nerf.run.folder import CONFIG
-    from toonset.nerf.viewer.build import view_html
+    from toonset.nerf.viewer.build import run_of, view_html
     from toonset.palette.names import one_line
     from toonset.read import check_there
     from toonset.write import check_new_file, new_files, write_bytes
 
     check_there([folder], "run or bundle", BundleError)
-    if not any((place / CONFIG).is_file() for place in (folder, folder / "run")):
+    if run_of(folder) is None:
         transforms_file(folder)  # refused before anything is drawn
     check_new_file(out, force=force)
     printer.progress("drawing all views of the page")

@@ -19,7 +19,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.camera import Camera
 from toonset.nerf.hull.mannequin_shape import FINER, Shape, ShapeView
-from toonset.nerf.look.border_lines import Ground, missing_lines
+from toonset.nerf.look.border_lines import Unlined, missing_lines
 from toonset.nerf.look.choose import OTHER, Look, choose, filled_from, mixed, shared_groups
 from toonset.nerf.look.drawings import (
     CRUMB,
@@ -270,8 +270,8 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
         color, labels = mixed(looks, np.zeros_like(chosen), counts)
     color, labels = _extended(kept, color, labels, pen)
     if line is not None and len(drawings.lined_pairs):
-        ground = _ground(looks, np.where(kept, chosen, -1), alpha > SOLID, figure_px)
-        cover = missing_lines(ground, drawings.lined_pairs, line.width_px * scale)
+        unlined = _unlined(looks, np.where(kept, chosen, -1), alpha > SOLID, figure_px)
+        cover = missing_lines(unlined, drawings.lined_pairs, line.width_px * scale)
         label, rgb = drawings.ink(line)
         color = color + cover[..., None] * (rgb / np.float32(255) - color)
         labels = np.where(cover > SOLID, np.uint8(label), labels)
@@ -302,18 +302,18 @@ def _extended(
     return np.where(kept[..., None], color, beyond), np.where(kept, labels, beyond_labels)
 
 
-def _ground(
+def _unlined(
     looks: list[Look], chosen: Int[np.ndarray, "h w"], inside: Bool[np.ndarray, "h w"], px: float
-) -> Ground:
+) -> Unlined:
     """Return the paints that a view's drawings have there under their lines."""
     labels, lined = (np.zeros(chosen.shape, np.uint8) for _ in range(2))
     for number, look in enumerate(looks):
         here = (chosen == number).view(np.uint8)
         if here.any():
-            places, own = (look.x, look.y), look.texture.ground
+            places, own = (look.x, look.y), look.texture.unlined
             for whole, its in ((labels, own.labels), (lined, own.lined.view(np.uint8))):
                 cv2.copyTo(sample_picture(its, places, cv2.INTER_NEAREST), here, whole)
-    return Ground(labels, lined > 0, inside & (chosen >= 0), px)
+    return Unlined(labels, lined > 0, inside & (chosen >= 0), px)
 
 
 def _posed(

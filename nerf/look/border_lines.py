@@ -30,7 +30,7 @@ Pairs = UInt16[np.ndarray, " pairs"]
 
 
 @dataclass(frozen=True, eq=False)
-class Ground:
+class Unlined:
     """A picture's paints without its lines.
 
     Attributes:
@@ -53,7 +53,7 @@ class Ground:
         inside: Mask,
         pen: tuple[float, tuple[int, int, int]] | None,
         figure_px: float,
-    ) -> Ground:
+    ) -> Unlined:
         """Return the paints under a drawing's lines, which `pen` drew."""
         lined = lines_of(paint, pen) & inside
         kept = inside & ~lined if (inside & ~lined).any() else np.ones_like(inside)
@@ -81,37 +81,39 @@ class Ground:
         return distance_to(self.lined) > max(1.0, BROKEN * pen_px)
 
 
-def lined_pairs(grounds: Iterable[Ground], pen_px: float) -> Pairs:
+def lined_pairs(drawn: Iterable[Unlined], pen_px: float) -> Pairs:
     """Return the pairs of paints between which an artist draws a line.
 
     Args:
-        grounds: of the drawings.
+        drawn: of the drawings.
         pen_px: width of their lines.
     """
     length, lined = np.zeros(NONE + 1), np.zeros(NONE + 1)
-    for ground in grounds:
-        pairs = ground.borders()
-        for total, these in ((length, pairs), (lined, pairs[~ground.broken(pen_px)])):
-            total += np.bincount(these.ravel(), minlength=NONE + 1) / ground.figure_px
+    for unlined in drawn:
+        pairs = unlined.borders()
+        for total, these in ((length, pairs), (lined, pairs[~unlined.broken(pen_px)])):
+            total += np.bincount(these.ravel(), minlength=NONE + 1) / unlined.figure_px
     length[NONE] = 0
     always = (length > 2 * LEAST) & (lined > LINED * length)  # counted on both sides
     return np.flatnonzero(always).astype(np.uint16)
 
 
-def missing_lines(ground: Ground, lined: Pairs, pen_px: float) -> Float[np.ndarray, "height width"]:
+def missing_lines(
+    unlined: Unlined, lined: Pairs, pen_px: float
+) -> Float[np.ndarray, "height width"]:
     """Return how far lines that a view lacks cover every pixel, 0 to 1.
 
     Args:
-        ground: of the view.
+        unlined: of the view.
         lined: the pairs that have lines.
         pen_px: width of the lines.
     """
     wanted = np.zeros(NONE + 1, dtype=bool)
     wanted[lined] = True
-    at = wanted[ground.borders()]
-    gaps = at & ground.broken(pen_px)
+    at = wanted[unlined.borders()]
+    gaps = at & unlined.broken(pen_px)
     if not gaps.any():
         return np.zeros(gaps.shape, np.float32)
     drawn = at & dilate(gaps, max(1, round(pen_px)))  # until it meets the line that is there
     cover = np.clip(pen_px / 2 - distance_to(drawn), 0, 1).astype(np.float32)
-    return np.where(ground.inside, cover, 0)
+    return np.where(unlined.inside, cover, 0)

@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float, Float16, Shaped, UInt8, UInt16
 from toonset.camera import Camera
 from toonset.dataset.silhouettes.mask import mask_of
 from toonset.nerf.hull.mannequin_shape import Shape
-from toonset.nerf.look.border_lines import Ground, lined_pairs
+from toonset.nerf.look.border_lines import Unlined, lined_pairs
 from toonset.nerf.look.features import Features, features_of
 from toonset.nerf.look.outline import Outline, without_crumbs
 from toonset.nerf.look.paint_labels import paint_labels, repainted
@@ -199,12 +199,12 @@ class Drawings:
         """Return the pairs of `paints` between which the artist draws a line."""
         if self.outline is None:
             return np.zeros(0, np.uint16)
-        grounds = (
-            texture.ground
+        drawn = (
+            texture.unlined
             for texture, view in zip(self.textures, self.views, strict=True)
             if not view.mirrored
         )
-        return lined_pairs(grounds, self.outline.width_px)
+        return lined_pairs(drawn, self.outline.width_px)
 
     @cached_property
     def half(self) -> Drawings:
@@ -289,12 +289,12 @@ class Texture:
         return features_of(self.paint, self.labels, inside, self.pen, self.figure_px, drawn)
 
     @cached_property
-    def ground(self) -> Ground:
+    def unlined(self) -> Unlined:
         """Return its paints without lines and features."""
         found = self.features
         inside = (self.whole[..., 3] > 0.5) & (found.numbers == 0)
         drawn = self.in_own / np.float32(255)
-        return Ground.of(drawn, found.labels, inside, self.pen, self.figure_px)
+        return Unlined.of(drawn, found.labels, inside, self.pen, self.figure_px)
 
     @cached_property
     def afloat(self) -> Bool[np.ndarray, "height width"]:

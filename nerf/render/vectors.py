@@ -42,7 +42,7 @@ LINES = -1  # the paint of lines
 OFF_PX = 0.2  # how far a curve may be off the border that it follows
 MOST_PX = 1600  # longest side: larger views are traced smaller
 NEAR = 0.06  # of colours (Euclidean, channels in [0, 1]): nearer ones count as one
-SAME = 4 / 255  # largest difference of a channel of one that is a paint, but averaged
+SAME = 4 / 255  # of a channel: a mean of pixels that is so near to a paint is that paint
 STEP = 0.12  # of colours: less between neighbours is no edge
 MIXED = 0.02  # by how much two colours must explain a pixel better than one
 AFAR = 0.03  # the same, if the second is not seen around
@@ -429,7 +429,7 @@ def _with_borders(shares: _Shares, colors: Colors, picture: _Picture) -> _Shares
 
 
 def _as_paints(colors: Colors, paints: UInt8[np.ndarray, "paints 3"]) -> Colors:
-    """Return colours, those of them that are a paint but for rounding exactly as it is."""
+    """Return the colours, exactly a paint's where averaging has moved them off it."""
     away = np.abs(paints / np.float32(255) - colors[:, None]).max(axis=-1, initial=0)
     if not away.size:
         return colors

@@ -93,11 +93,17 @@ def view_html(folder: Path, size: int | None = None, title: str = "") -> str:
     Raises:
         ToonsetError: a file is missing or damaged.
     """
-    runs = [place for place in (folder, folder / "run") if (place / CONFIG).is_file()]
+    run = run_of(folder)
     with working_threads():
-        if runs:
-            return _run_html(runs[0], size, title)
+        if run is not None:
+            return _run_html(run, size, title)
         return _bundle_html(read_bundle(folder), size, title)
+
+
+def run_of(folder: Path) -> Path | None:
+    """Return a run folder: this one, or that of a bundle; None where there is none."""
+    runs = (place for place in (folder, folder / "run") if (place / CONFIG).is_file())
+    return next(runs, None)
 
 
 def _run_html(run: Path, size: int | None, title: str) -> str:

@@ -20,8 +20,9 @@ from toonset.raster import dilate, from_nearest
 
 PARTS = 16  # of a mixture
 LIKE = 9.0  # levels of 255: a colour so near to its paint is that paint
-AROUND = 7  # pixels, a window's side: paints in it may be in a mixture, the commonest COMMON; and
-# so far away labels name a paint
+# Pixels: the side of a window, paints in which may be in a mixture, the commonest COMMON; and how
+# far a labelled area names a paint
+AROUND = 7
 COMMON = 4
 BETTER = 1.15  # a mixture explains a colour so much better, squared, or it is none
 LINELESS = 2.0  # the same of one without the line's colour, where there are lines

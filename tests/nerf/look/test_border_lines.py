@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from toonset.nerf.look.border_lines import Ground, lined_pairs, missing_lines
+from toonset.nerf.look.border_lines import Unlined, lined_pairs, missing_lines
 
 SIZE, INK = 100, (10, 10, 10)
 INSIDE = np.ones((SIZE, SIZE), bool)
@@ -13,7 +13,7 @@ PAINTS = np.array([(200, 60, 60), (60, 200, 60), (60, 60, 200)], np.uint8)
 PEN = 3.0
 
 
-def ground_of(gap: slice = slice(0), ink: tuple[int, int, int] = INK) -> Ground:
+def unlined_of(gap: slice = slice(0), ink: tuple[int, int, int] = INK) -> Unlined:
     """Return paint 0 above paint 1, a line between them but for a gap, 2 right of both without."""
     labels = np.zeros((SIZE, SIZE), np.uint8)
     labels[50:] = 1
@@ -21,31 +21,31 @@ def ground_of(gap: slice = slice(0), ink: tuple[int, int, int] = INK) -> Ground:
     drawn = PAINTS[labels]
     drawn[49:52, :70] = ink
     drawn[49:52, gap] = PAINTS[labels][49:52, gap]
-    return Ground.of(drawn / np.float32(255), labels, INSIDE, (PEN, ink), float(SIZE))
+    return Unlined.of(drawn / np.float32(255), labels, INSIDE, (PEN, ink), float(SIZE))
 
 
 def test_a_gap_in_a_line_between_paints_is_closed() -> None:
-    pairs = lined_pairs([ground_of()], PEN)
+    pairs = lined_pairs([unlined_of()], PEN)
     assert pairs.tolist() == [1]  # of paints 0 and 1
-    cover = missing_lines(ground_of(slice(20, 40)), pairs, PEN)
+    cover = missing_lines(unlined_of(slice(20, 40)), pairs, PEN)
     assert cover[47:53, 22:38].sum(axis=0) == pytest.approx(PEN, abs=0.5)
     assert cover[40:46].sum() + cover[55:].sum() == 0
     assert cover[:, :14].sum() + cover[:, 46:].sum() == 0
 
 
 def test_whole_lines_are_left_alone() -> None:
-    drawing = ground_of()
+    drawing = unlined_of()
     assert missing_lines(drawing, lined_pairs([drawing], PEN), PEN).sum() == 0
 
 
 def test_what_is_lined_by_halves_stands_for_steps_in_depth() -> None:
-    assert len(lined_pairs([ground_of(slice(0, 35))], PEN)) == 0
-    assert len(lined_pairs([ground_of(slice(0, 35)), *[ground_of()] * 12], PEN)) == 1
+    assert len(lined_pairs([unlined_of(slice(0, 35))], PEN)) == 0
+    assert len(lined_pairs([unlined_of(slice(0, 35)), *[unlined_of()] * 12], PEN)) == 1
 
 
 def test_without_a_pen_no_pair_is_lined() -> None:
-    drawing = ground_of()
-    bare = Ground.of(
+    drawing = unlined_of()
+    bare = Unlined.of(
         PAINTS[drawing.labels] / np.float32(255), drawing.labels, INSIDE, None, float(SIZE)
     )
     assert len(lined_pairs([bare], PEN)) == 0
@@ -53,11 +53,11 @@ def test_without_a_pen_no_pair_is_lined() -> None:
 
 def test_lines_of_any_colour_count() -> None:
     navy = (20, 20, 90)
-    assert lined_pairs([ground_of(ink=navy)], PEN).tolist() == [1]
+    assert lined_pairs([unlined_of(ink=navy)], PEN).tolist() == [1]
 
 
 def test_paint_goes_on_under_lines() -> None:
-    labels = ground_of().labels
+    labels = unlined_of().labels
     assert (labels[:48, :68] == 0).all()
     assert (labels[53:, :68] == 1).all()
     assert set(np.unique(labels[:, 30])) == {0, 1}

@@ -228,6 +228,14 @@ def test_what_is_traced_smaller_stays_where_it_is(enlarged: float) -> None:
     np.testing.assert_allclose(place, (120, 100), atol=OFF_PX)
 
 
+@pytest.mark.parametrize(("off", "is_paint"), [(3, True), (8, False)])
+def test_colours_but_for_rounding_are_the_palettes(off: int, is_paint: bool) -> None:
+    drawn = PAINTS.copy()
+    drawn[1] += np.uint8(off)
+    regions = trace(view_of(figure(), drawn), PAINTS, None).regions
+    assert (tuple(PAINTS[1].tolist()) in {region.rgb for region in regions}) == is_paint
+
+
 def test_svg_names_groups_and_holds_every_colour_in_one_class() -> None:
     names = ["red & <hot>", 'skin "light"', "teal", "3rd"]
     data = encode_svg(trace(view_of(figure()), PAINTS, None), names, "a < b")

@@ -146,3 +146,14 @@ def test_a_field_in_a_whole_box_is_trained_rendered_and_read_again(tmp_path: Pat
     loaded, camera = read_field(tmp_path), held_out().frames[0].camera
     np.testing.assert_array_equal(render(training.result, camera).rgb, render(loaded, camera).rgb)
     assert mean_psnr(loaded) > 15
+
+
+def test_mirror_images_are_looked_at_and_do_not_carve() -> None:
+    scene = scene_of([np.radians(yaw) for yaw in (0, 90, 135, 180, 270, 315)], 0.0, 0.15)
+    options = replace(QUICK, steps=LEAST_STEPS, symmetric="on")
+    mirrored, plain = (
+        fit_field(scene, one) for one in (options, replace(options, symmetric="off"))
+    )
+    assert mirrored.symmetry is not None
+    assert mirrored.symmetry.mirrored
+    assert torch.equal(mirrored.result.hull.support, plain.result.hull.support)
