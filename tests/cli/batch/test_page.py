@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Request
+from playwright.sync_api import Browser, Request, expect
 
 from bench.batch.rows import FIRST_FIRST, draw_thumbs, many, sheet
 from tests.cli.batch.page_under_test import Shown, names_of, one_of_each
@@ -337,7 +337,7 @@ def test_pictures_are_shown_and_turn_when_they_are_looked_at(
     turn.click()
     assert moving.count() == 2
     turn.click()
-    page.wait_for_function("() => !document.querySelector('.turn img')")
+    expect(moving).to_have_count(0)
     assert page.locator("tr:nth-child(3) .picture").count() == 0
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from base64 import b64encode
 from dataclasses import dataclass, field
 from functools import cache
@@ -161,6 +162,21 @@ class Viewer:
     def rest(self) -> None:
         """Wait until the page has drawn and written its address."""
         self.page.wait_for_timeout(450)
+
+    def until(self, condition: str, limit_s: float = 30.0) -> None:
+        """Wait until a condition of JavaScript holds.
+
+        The browser's own wait asks again by `eval`, which the page's policy forbids: it
+        fails wherever the condition does not hold at once.
+
+        Raises:
+            TimeoutError: it did not hold in time.
+        """
+        end = time.monotonic() + limit_s
+        while not self.page.evaluate(f"Boolean({condition})"):
+            if time.monotonic() > end:
+                raise TimeoutError(f"{condition} did not hold in {limit_s:g} s")
+            self.page.wait_for_timeout(20)
 
     def middle(self) -> tuple[float, float]:
         box = self.page.locator("#view").bounding_box()

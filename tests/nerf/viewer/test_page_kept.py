@@ -138,7 +138,7 @@ def test_the_embed_code_shows_the_figure_alone(open_page: Open, tmp_path: Path) 
     copied = "navigator.clipboard.writeText = async (text) => { globalThis.copied = text; }"
     viewer.page.evaluate(f"() => {{ {copied} }}")
     viewer.page.get_by_role("button", name="Copy embed code").click()
-    viewer.page.wait_for_function("globalThis.copied")
+    viewer.until("globalThis.copied")
     code = viewer.page.evaluate("copied")
     (tmp_path / "host.html").write_text(f"<!doctype html><p>host</p>{code}", encoding="utf-8")
     page = viewer.page.context.new_page()

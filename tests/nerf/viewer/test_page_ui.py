@@ -308,7 +308,7 @@ def test_what_no_drawing_shows_is_marked_when_asked(open_page: Open) -> None:
 
 def test_it_turns_until_it_is_touched(open_page: Open) -> None:
     viewer = open_page(reduced_motion="no-preference")
-    viewer.page.wait_for_function("toonset.store.state.yaw > 5")
+    viewer.until("toonset.store.state.yaw > 5")
     viewer.page.locator("h1").click()
     yaw = viewer.state["yaw"]
     viewer.page.wait_for_timeout(300)
@@ -325,7 +325,7 @@ def test_it_turns_until_it_is_touched(open_page: Open) -> None:
 
 def test_the_turn_button_stops_what_turns_by_itself(open_page: Open) -> None:
     viewer = open_page(reduced_motion="no-preference")
-    viewer.page.wait_for_function("toonset.store.state.yaw > 5")
+    viewer.until("toonset.store.state.yaw > 5")
     button = viewer.page.get_by_role("button", name="Turn", exact=True)
     button.click()
     assert button.get_attribute("aria-pressed") == "false"
@@ -338,13 +338,13 @@ def test_the_stage_fills_the_screen_and_comes_back(open_page: Open) -> None:
     viewer = open_page()
     button = viewer.page.get_by_role("button", name="Full screen")
     button.click()
-    viewer.page.wait_for_function("document.fullscreenElement !== null")
+    viewer.until("document.fullscreenElement !== null")
     viewer.rest()
     size = viewer.page.evaluate("[innerWidth, innerHeight]")
     assert viewer.shot["camera"]["size"] == size
     assert button.get_attribute("aria-pressed") == "true"
     button.click()
-    viewer.page.wait_for_function("document.fullscreenElement === null")
+    viewer.until("document.fullscreenElement === null")
 
 
 def test_hints_about_keys_are_not_for_phones(open_page: Open) -> None:
