@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
 
-ROW = 64  # pixels in a row of `in_rows`
+ROW, MOST_ROWS = 64, 32766  # pixels in a row of `in_rows`; rows that OpenCV takes
 BROAD = 3.0  # pixels of a smaller copy that a blur's sigma keeps
 LONG_REACH = 24  # pixels, from which on OpenCV's distances are as fast
 
@@ -114,7 +114,8 @@ def in_rows(pixels: Int[np.ndarray, " n"]) -> Int[np.ndarray, "rows columns"]:
     """Return numbers of pixels in rows, as OpenCV's `remap` takes them; the last is repeated."""
     if not len(pixels):
         return pixels.reshape(0, ROW)
-    return np.pad(pixels, (0, -len(pixels) % ROW), mode="edge").reshape(-1, ROW)
+    row = max(ROW, -(-len(pixels) // MOST_ROWS))
+    return np.pad(pixels, (0, -len(pixels) % row), mode="edge").reshape(-1, row)
 
 
 def taken(

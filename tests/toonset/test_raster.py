@@ -73,6 +73,9 @@ def test_pixels_in_rows_are_all_of_them_and_the_last_again() -> None:
     rows = in_rows(np.arange(100))
     assert rows.reshape(-1)[:100].tolist() == list(range(100))
     assert set(rows.reshape(-1)[100:].tolist()) == {99}
+    many = in_rows(np.arange(64 * 40_000))  # OpenCV's `remap` takes no more than 32,766 rows
+    assert len(many) <= 32_766
+    assert many.size == 64 * 40_000 + -64 * 40_000 % many.shape[1]
 
 
 def test_taken_is_what_rows_and_columns_index() -> None:
