@@ -19,7 +19,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.camera import Camera
 from toonset.nerf.hull.mannequin_shape import FINER, Shape, ShapeView
-from toonset.nerf.look.border_lines import Unlined, missing_lines
+from toonset.nerf.look.border_lines import Unlined, missing_lines, missing_steps
 from toonset.nerf.look.choose import OTHER, Look, choose, filled_from, mixed, shared_groups
 from toonset.nerf.look.drawings import (
     CRUMB,
@@ -269,9 +269,13 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
     if not shown.any():  # as if the body were of glass
         color, labels = mixed(looks, np.zeros_like(chosen), counts)
     color, labels = _extended(kept, color, labels, pen)
-    if line is not None and len(drawings.lined_pairs):
+    measured = sight is None and drawings.all_round
+    if line is not None and (measured or len(drawings.lined_pairs)):
         unlined = _unlined(looks, np.where(kept, chosen, -1), alpha > SOLID, figure_px)
         cover = missing_lines(unlined, drawings.lined_pairs, line.width_px * scale)
+        if measured:
+            hidden = missing_steps(unlined, depth, drawings.height, line.width_px * scale)
+            cover = np.maximum(cover, hidden)
         label, rgb = drawings.ink(line)
         color = color + cover[..., None] * (rgb / np.float32(255) - color)
         labels = np.where(cover > SOLID, np.uint8(label), labels)

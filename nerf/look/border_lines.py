@@ -3,6 +3,9 @@
 The drawings tell of every pair of paints whether the artist draws a line along all of its borders.
 Where a view has such a border without a line, because a seam runs there, one is drawn. Pairs with a
 line along a part of their border are left as they are: there it stands for a step in depth.
+
+Where a part of the figure hides another of its own paint nothing but a line tells them apart: one
+is drawn along deep steps that no line is near.
 """
 
 from __future__ import annotations
@@ -15,17 +18,23 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8, UInt16
 
 from toonset.nerf.look.features import lines_of
-from toonset.raster import dilate, distance_to, nearest, taken
+from toonset.nerf.look.step_lines import step_places, step_sides
+from toonset.raster import dilate, distance_to, nearest, sized_parts, taken
 
 LINED = 0.9  # of the border of two paints: they have a line
 LEAST = 0.05  # of the figure's height: shorter borders tell nothing
 SMOOTH = 0.008  # of the height: borders are smooth over so much
 BROKEN = 0.6  # times the pen's width, to the nearest line: so far away there is none
+# Of the height: steps, and those that most of a hidden edge is deeper than; shorter edges are none
+STEP, DEEP, LONG = 0.03, 0.08, 0.04
+BESIDE, ASTRAY = 0.01, 0.015  # of the height: where a step's paints are; a line so near is its own
+GAP, SOFT_PX = 0.006, 1.0  # of the height: edges go on over so much; sigma that smooths them
 PAINTS = 256  # a pair is its lower paint times so many, and the higher one
 NONE = 0xFFFF  # no pair
 
 Mask = Bool[np.ndarray, "height width"]
 Labels = UInt8[np.ndarray, "height width"]
+Depth = Float[np.ndarray, "height width"]
 Pairs = UInt16[np.ndarray, " pairs"]
 
 
@@ -117,3 +126,66 @@ def missing_lines(
     drawn = at & dilate(gaps, max(1, round(pen_px)))  # until it meets the line that is there
     cover = np.clip(pen_px / 2 - distance_to(drawn), 0, 1).astype(np.float32)
     return np.where(unlined.inside, cover, 0)
+
+
+def missing_steps(
+    unlined: Unlined, depth: Depth, height: float, pen_px: float
+) -> Float[np.ndarray, "height width"]:
+    """Return how far lines along hidden edges that a view lacks cover every pixel, 0 to 1.
+
+    Args:
+        unlined: of the view.
+        depth: of the surface, world units.
+        height: of the figure, world units.
+        pen_px: width of the lines.
+    """
+    long_px = LONG * unlined.figure_px
+    lines = _parts_of(unlined.lined, long_px * pen_px)
+    gaps = hidden_edges(unlined, depth, height)
+    if lines.any():
+        gaps &= distance_to(lines) > ASTRAY * unlined.figure_px
+    gaps = _parts_of(gaps, long_px)
+    if not gaps.any():
+        return np.zeros(gaps.shape, np.float32)
+    away = cv2.GaussianBlur(distance_to(gaps), (0, 0), SOFT_PX)
+    return np.where(unlined.inside, np.clip((pen_px + 1) / 2 - away, 0, 1), 0).astype(np.float32)
+
+
+def hidden_edges(unlined: Unlined, depth: Depth, height: float) -> Mask:
+    """Return thin lines along deep steps in depth, and where borders of paints are beside them.
+
+    Args:
+        unlined: of a picture.
+        depth: of the surface, world units.
+        height: of the figure, world units.
+    """
+    from skimage.morphology import skeletonize
+
+    px = unlined.figure_px
+    shown = np.where(unlined.inside, depth, np.nan)
+    places, across = step_places(shown, STEP * height, 1, 1.0)
+    steps = np.zeros(depth.shape, dtype=bool)
+    if not len(places):
+        return steps
+    last = np.array(depth.shape)[::-1] - 1
+    at, near, far = (
+        np.floor(places + by * across).astype(int).clip(0, last).T[::-1]
+        for by in (0.0, -BESIDE * px, BESIDE * px)
+    )
+    steps[tuple(at)] = True
+    edges = (unlined.borders() != NONE) & (distance_to(steps) < ASTRAY * px)
+    edges[tuple(at)] |= unlined.labels[tuple(near)] == unlined.labels[tuple(far)]
+    part, areas = sized_parts(dilate(edges, max(1, round(GAP * px))))
+    deep, _ = step_sides(shown, DEEP * height)
+    deeps, lengths = (np.bincount(part[on], minlength=len(areas)) for on in (deep, steps))
+    kept = (lengths > LONG * px) & (2 * deeps > lengths)
+    kept[0] = False
+    return np.asarray(skeletonize(kept[part]))
+
+
+def _parts_of(mask: Mask, least_px: float) -> Mask:
+    """Return the parts of a mask that have more pixels."""
+    part, areas = sized_parts(mask)
+    large = areas > least_px
+    large[0] = False
+    return np.asarray(large[part])

@@ -29,6 +29,7 @@ BESIDE_PX = 2  # behind a step of a known shape: hands miss steps by as much
 FARTHEST_PX = 50.0  # from an edge: farther is as far
 COARSE = 0.6  # times a drawing's size: smaller views take drawings of half the size
 CRUMB = 3e-4  # of the squared height of the figure: smaller patches that are seen are noise
+ROUND = 6  # drawings: a surface from fewer has steps of its own making
 INK_LIKE = 60  # sum of channels: a palette colour so near to the ink is the ink's
 SQUARE = np.ones((3, 3), dtype=np.uint8)
 AROUND = np.ones((2 * BESIDE_PX + 1, 2 * BESIDE_PX + 1), dtype=np.uint8)
@@ -205,6 +206,11 @@ class Drawings:
             if not view.mirrored
         )
         return lined_pairs(drawn, self.outline.width_px)
+
+    @property
+    def all_round(self) -> bool:
+        """Return whether so many drawings gave the surface that its steps are the figure's."""
+        return sum(not view.mirrored for view in self.views) >= ROUND
 
     @cached_property
     def half(self) -> Drawings:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from toonset.nerf.look.border_lines import Unlined, lined_pairs, missing_lines
+from toonset.nerf.look.border_lines import Unlined, lined_pairs, missing_lines, missing_steps
 
 SIZE, INK = 100, (10, 10, 10)
 INSIDE = np.ones((SIZE, SIZE), bool)
@@ -61,3 +61,30 @@ def test_paint_goes_on_under_lines() -> None:
     assert (labels[:48, :68] == 0).all()
     assert (labels[53:, :68] == 1).all()
     assert set(np.unique(labels[:, 30])) == {0, 1}
+
+
+def hiding(step: float, line: slice = slice(0)) -> tuple[Unlined, np.ndarray]:
+    """Return one paint, right of column 40 `step` heights behind, with a line in some rows."""
+    labels = np.zeros((SIZE, SIZE), np.uint8)
+    drawn = PAINTS[labels]
+    drawn[line, 39:42] = INK
+    depth = np.zeros((SIZE, SIZE))
+    depth[:, 40:] = step
+    return Unlined.of(drawn / np.float32(255), labels, INSIDE, (PEN, INK), float(SIZE)), depth
+
+
+def test_a_part_before_another_of_its_own_paint_has_a_line() -> None:
+    cover = missing_steps(*hiding(0.2), 1.0, PEN)
+    assert cover[10:90].sum(axis=1) == pytest.approx(PEN, abs=0.8)
+    assert cover[:, :35].sum() + cover[:, 45:].sum() == 0
+
+
+def test_shallow_steps_and_lined_ones_have_none() -> None:
+    assert missing_steps(*hiding(0.05), 1.0, PEN).sum() == 0
+    assert missing_steps(*hiding(0.2, slice(None)), 1.0, PEN).sum() == 0
+
+
+def test_a_line_along_a_part_of_a_step_goes_on() -> None:
+    cover = missing_steps(*hiding(0.2, slice(0, 50)), 1.0, PEN)
+    assert cover[55:90].max(axis=1).min() == pytest.approx(1)
+    assert cover[:45].sum() == 0
