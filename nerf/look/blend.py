@@ -269,11 +269,11 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
     if not shown.any():  # as if the body were of glass
         color, labels = mixed(looks, np.zeros_like(chosen), counts)
     color, labels = _extended(kept, color, labels, pen)
-    measured = sight is None and drawings.all_round
-    if line is not None and (measured or len(drawings.lined_pairs)):
+    stepped = sight is None and drawings.steps_hold
+    if line is not None and (stepped or len(drawings.lined_pairs)):
         unlined = _unlined(looks, np.where(kept, chosen, -1), alpha > SOLID, figure_px)
         cover = missing_lines(unlined, drawings.lined_pairs, line.width_px * scale)
-        if measured:
+        if stepped:
             hidden = missing_steps(unlined, depth, drawings.height, line.width_px * scale)
             cover = np.maximum(cover, hidden)
         label, rgb = drawings.ink(line)

@@ -4,8 +4,8 @@ The drawings tell of every pair of paints whether the artist draws a line along 
 Where a view has such a border without a line, because a seam runs there, one is drawn. Pairs with a
 line along a part of their border are left as they are: there it stands for a step in depth.
 
-Where a part of the figure hides another of its own paint nothing but a line tells them apart: one
-is drawn along deep steps that no line is near.
+Where one part of the figure hides another of the same paint, only a line tells them apart: one is
+drawn along deep steps in depth that no line is near.
 """
 
 from __future__ import annotations
@@ -25,10 +25,12 @@ LINED = 0.9  # of the border of two paints: they have a line
 LEAST = 0.05  # of the figure's height: shorter borders tell nothing
 SMOOTH = 0.008  # of the height: borders are smooth over so much
 BROKEN = 0.6  # times the pen's width, to the nearest line: so far away there is none
-# Of the height: steps, and those that most of a hidden edge is deeper than; shorter edges are none
-STEP, DEEP, LONG = 0.03, 0.08, 0.04
-BESIDE, ASTRAY = 0.01, 0.015  # of the height: where a step's paints are; a line so near is its own
-GAP, SOFT_PX = 0.006, 1.0  # of the height: edges go on over so much; sigma that smooths them
+STEP, DEEP = 0.03, 0.08  # of the height: a step in depth; most of a hidden edge is so deep
+LONG = 0.04  # of the height: shorter edges and lines do not count
+BESIDE = 0.01  # of the height: so far to both sides a step's paints are looked up
+ASTRAY = 0.015  # of the height: a drawn line so near an edge is its line
+GAP = 0.006  # of the height: edges go on over so much
+SOFT_PX = 1.0  # sigma that smooths them
 PAINTS = 256  # a pair is its lower paint times so many, and the higher one
 NONE = 0xFFFF  # no pair
 
@@ -141,7 +143,7 @@ def missing_steps(
     """
     long_px = LONG * unlined.figure_px
     lines = _parts_of(unlined.lined, long_px * pen_px)
-    gaps = hidden_edges(unlined, depth, height)
+    gaps = _hidden_edges(unlined, depth, height)
     if lines.any():
         gaps &= distance_to(lines) > ASTRAY * unlined.figure_px
     gaps = _parts_of(gaps, long_px)
@@ -151,8 +153,8 @@ def missing_steps(
     return np.where(unlined.inside, np.clip((pen_px + 1) / 2 - away, 0, 1), 0).astype(np.float32)
 
 
-def hidden_edges(unlined: Unlined, depth: Depth, height: float) -> Mask:
-    """Return thin lines along deep steps in depth, and where borders of paints are beside them.
+def _hidden_edges(unlined: Unlined, depth: Depth, height: float) -> Mask:
+    """Return lines, a pixel wide, along deep steps in depth and borders of paints beside them.
 
     Args:
         unlined: of a picture.

@@ -19,6 +19,7 @@ from toonset.nerf.look.paint_labels import paint_labels, repainted
 from toonset.nerf.look.shade import Shade
 from toonset.nerf.look.silhouette import Rim, rim_of
 from toonset.nerf.look.step_lines import StepLines, step_edges
+from toonset.nerf.sections.roles import hull_is_square
 from toonset.palette.palette import Shadow
 from toonset.palette.pixels.labels import nearest_colors
 from toonset.raster import depth_inside, distance_to, nearest, sized_parts, taken
@@ -29,7 +30,6 @@ BESIDE_PX = 2  # behind a step of a known shape: hands miss steps by as much
 FARTHEST_PX = 50.0  # from an edge: farther is as far
 COARSE = 0.6  # times a drawing's size: smaller views take drawings of half the size
 CRUMB = 3e-4  # of the squared height of the figure: smaller patches that are seen are noise
-ROUND = 6  # drawings: a surface from fewer has steps of its own making
 INK_LIKE = 60  # sum of channels: a palette colour so near to the ink is the ink's
 SQUARE = np.ones((3, 3), dtype=np.uint8)
 AROUND = np.ones((2 * BESIDE_PX + 1, 2 * BESIDE_PX + 1), dtype=np.uint8)
@@ -208,9 +208,9 @@ class Drawings:
         return lined_pairs(drawn, self.outline.width_px)
 
     @property
-    def all_round(self) -> bool:
-        """Return whether so many drawings gave the surface that its steps are the figure's."""
-        return sum(not view.mirrored for view in self.views) >= ROUND
+    def steps_hold(self) -> bool:
+        """Return whether drawings from enough sides gave the surface to trust its depth steps."""
+        return not hull_is_square([view.camera for view in self.views if not view.mirrored])
 
     @cached_property
     def half(self) -> Drawings:

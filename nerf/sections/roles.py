@@ -60,9 +60,14 @@ def mirror_images(
 
 def wants_sections(cameras: Sequence[Camera]) -> bool:
     """Return whether drawings from here have sections, and a hull of them would be square."""
+    return at_eye_level(cameras) and hull_is_square(cameras)
+
+
+def hull_is_square(cameras: Sequence[Camera]) -> bool:
+    """Return whether a hull of outlines from here would have edges that no figure has."""
     yaws = [yaw_of(camera) for camera in cameras]
     half = largest_gap(yaws, 2 * math.pi) > UNDRAWN
-    return at_eye_level(cameras) and largest_gap(yaws, math.pi) > (GAP_OF_HALF if half else GAP)
+    return largest_gap(yaws, math.pi) > (GAP_OF_HALF if half else GAP)
 
 
 def at_eye_level(cameras: Sequence[Camera]) -> bool:

@@ -145,6 +145,25 @@ def test_a_line_between_paints_goes_on_over_the_seam_of_two_drawings() -> None:
     assert gaps() > 2
 
 
+def test_a_part_that_hides_its_own_paint_has_a_line_where_many_drawings_gave_the_surface(
+    egg: Drawings,
+) -> None:
+    shown = geometry(camera_at(0.35))
+    right = np.arange(shown.depth.shape[1]) > shown.depth.shape[1] // 2
+    nearer = replace(shown, depth=shown.depth - 0.2 * egg.height * right)
+    few = replace(egg, views=egg.views[:5], flows=())
+    mirrored = tuple(replace(view, mirrored=True) for view in egg.views[5:])
+
+    def darker(found: Drawings) -> int:
+        whole, stepped = (blend_view(found, view).rgb.max(axis=-1) for view in (shown, nearer))
+        inner = np.abs(np.arange(len(right)) - len(right) // 2) < 4
+        return int(((stepped < 0.3) & (whole > 0.5) & inner).sum())
+
+    assert darker(egg) > 20
+    assert darker(few) == 0
+    assert darker(replace(few, views=(*few.views, *mirrored))) == 0
+
+
 def test_recolouring_changes_one_paint_and_leaves_the_others(egg: Drawings) -> None:
     shown = geometry(camera_at(0.35))
     before = blend_view(egg, shown)
