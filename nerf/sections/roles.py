@@ -64,7 +64,12 @@ def wants_sections(cameras: Sequence[Camera]) -> bool:
 
 
 def hull_is_square(cameras: Sequence[Camera]) -> bool:
-    """Return whether a hull of outlines from here would have edges that no figure has."""
+    """Return whether a hull of outlines from here would have edges that no figure has.
+
+    Without any outline there is no hull to trust.
+    """
+    if not cameras:
+        return True
     yaws = [yaw_of(camera) for camera in cameras]
     half = largest_gap(yaws, 2 * math.pi) > UNDRAWN
     return largest_gap(yaws, math.pi) > (GAP_OF_HALF if half else GAP)

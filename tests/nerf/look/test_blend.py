@@ -162,6 +162,7 @@ def test_a_part_that_hides_its_own_paint_has_a_line_where_many_drawings_gave_the
     assert darker(egg) > 20
     assert darker(few) == 0
     assert darker(replace(few, views=(*few.views, *mirrored))) == 0
+    assert darker(replace(few, views=mirrored)) == 0
 
 
 def test_recolouring_changes_one_paint_and_leaves_the_others(egg: Drawings) -> None:
