@@ -2,8 +2,8 @@
 
 Two things tie the views together, both unknown and summed out on a grid:
 
-- one elevation, up to a few degrees: it separates twins (yaw -> 180 - yaw, elevation ->
-  -elevation) unless all views flip together;
+- one elevation, up to a few degrees, the fewer the more the views agree: it separates twins
+  (yaw -> 180 - yaw, elevation -> -elevation) unless all views flip together;
 - where the views are meant to be seen from: what a person says (labels), else an evenly spaced
   turn, yaw_i = start +- i * 360 / views, in either direction. Most sheets are one (and most start
   at the front), but an uneven sheet stays possible: "no turn" is one of the alternatives, and
@@ -29,8 +29,8 @@ from toonset.calib.search.candidates import Candidates
 from toonset.camera import angles_from_rotation
 from toonset.dataset.split_folder.view_labels import Label, label_rows
 
-ELEVATION_GRID = np.radians(np.arange(-30.0, 61.0, 2.5))
-ELEVATION_SIGMA = np.radians(4.0)  # of a view about its sheet's elevation
+ELEVATION_GRID = np.radians(np.arange(-30.0, 61.0, 1.25))
+ELEVATION_SIGMAS = np.radians([2.0, 4.0])  # of views about their sheet's elevation: either one
 TURN_VIEWS = 4  # fewer views make no turn
 TURN_STARTS = 36  # of the first view's yaw
 TURN_SIGMA = np.radians(8.0)  # of a view about its place
@@ -124,11 +124,13 @@ class SheetPosterior:
         wide = ElevationPrior()
         log_elevation = -0.5 * ((ELEVATION_GRID - wide.mean) / wide.sigma) ** 2
         log_elevation -= np.log(np.exp(log_elevation).sum())
-        many, grid = len(turns.places), len(ELEVATION_GRID)
+        many, grid, spreads = len(turns.places), len(ELEVATION_GRID), len(ELEVATION_SIGMAS)
         self.turns, self.faces, self.paint, self.asked = turns, faces, paint, asked
-        self.elevations = np.repeat(ELEVATION_GRID, many)
-        self.places = np.tile(turns.places, (grid, 1))
-        log_prior = np.repeat(log_elevation, many) + np.tile(turns.log_prior, grid)
+        self.elevations = np.repeat(ELEVATION_GRID, spreads * many)
+        self.sigmas = np.tile(np.repeat(ELEVATION_SIGMAS, many), grid)
+        self.places = np.tile(turns.places, (grid * spreads, 1))
+        log_prior = np.repeat(log_elevation, spreads * many)
+        log_prior = log_prior + np.tile(turns.log_prior, grid * spreads)
         # the second half: the same hypotheses where faces are none (a hat band, a mask at the back)
         self.log_prior = np.concatenate([log_prior + np.log1p(-BROKEN), log_prior + np.log(BROKEN)])
 
@@ -233,11 +235,11 @@ class SheetPosterior:
         """
         elevation = np.array([tilt(pose)[0][1] for pose in poses])
         yaw = np.array([_yaw(pose) for pose in poses])
-        tilted = (elevation - self.elevations[:, None]) / ELEVATION_SIGMA
+        tilted = (elevation - self.elevations[:, None]) / self.sigmas[:, None]
         turned = (yaw - self.places[:, index, None] + np.pi) % (2 * np.pi) - np.pi
         peak = np.log(2 * np.pi / (2.72 * TURN_SIGMA))  # t's density at its mode over the uniform's
         turn = np.where(np.isnan(turned), 0.0, _tail(turned / TURN_SIGMA) - peak)
-        unread = data + _tail(tilted) + turn
+        unread = data + _tail(tilted) + np.log(self.sigmas)[:, None] + turn
         if self.faces is None:
             return np.concatenate([unread, unread])
         return np.concatenate([unread - face_log_likelihood(self.faces, index, yaw), unread])

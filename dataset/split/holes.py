@@ -11,8 +11,9 @@ between arm and body) if all of this holds:
 - a line or another colour runs all round it: it does not fade into a shade of its own colour; but
   between the feet a shadow on the ground may close it,
 - its border looks like the figure's outline: as inked as that, and without soft shades beside it
-  (a white shirt has folds and borders on skin without the contour line); but beside light paint of
-  another tint (cream trousers on cream paper) it is enough that the patch has the paper's tint,
+  on this side of the line (a white shirt has folds and borders on skin without the contour line);
+  but beside light paint of another tint (cream trousers on cream paper) it is enough that the patch
+  has the paper's tint,
 - most of the figure is in other colours (else it is a line drawing, whose paper is its body).
 """
 
@@ -59,7 +60,8 @@ class BorderLook:
     Attributes:
         ink: dark pixels within 3 px.
         near: pixels within 3 px.
-        shades: pixels 3 to 4 px away that are nearly background; nearer, the edge itself is soft.
+        shades: pixels 3 to 4 px away that are nearly background, no ink between; nearer, the edge
+            itself is soft.
         far: pixels 3 to 4 px away.
     """
 
@@ -267,10 +269,13 @@ def _look(
 ) -> BorderLook:
     reach = [dilate(empty, steps) for steps in (2, 3, 4)]
     near, far = reach[1] & solid, reach[2] & ~reach[0] & solid
+    bare = empty
+    for _ in range(4):
+        bare = dilate(bare) & (empty | (luma >= INK_LUMA))
     return BorderLook(
         int((luma[near] < INK_LUMA).sum()),
         int(near.sum()),
-        int((contrast[far] < SOFT_SHADE).sum()),
+        int((contrast[far & bare] < SOFT_SHADE).sum()),
         int(far.sum()),
     )
 

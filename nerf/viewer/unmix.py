@@ -28,10 +28,11 @@ BETTER = 1.15  # a mixture explains a colour so much better, squared, or it is n
 LINELESS = 2.0  # the same of one without the line's colour, where there are lines
 FAR = 26.0  # levels of 255: a colour so far from all shades of its mixture is none of it
 ELSE = 2.0  # times LIKE: so much worse is a paint that is not around
-STRANGE = 2.5  # times LIKE: what is not so like it is not that paint
+STRANGE = 2.5  # times LIKE: what is not so like it is not that paint; under ink, once
 SHADED = 1.5  # times LIKE: so much worse is a shade of a paint
 DARKEST, BRIGHTEST = 0.3, 1.25  # shades of a paint
 BAND = 7  # pixels of a window that a paint's core has; blends along a border have less
+AREA = 21  # more are no blend, whatever labels say: three rows through the window
 THREE = np.ones((3, 3), np.uint8)
 TWO = np.ones((2, 2), np.uint8)  # pixels: what is thinner the lossy picture of tints loses
 
@@ -118,6 +119,8 @@ def unmixed(
     second = first.copy()
     near = _Near.of(cores, first, labels, there, at, line)
     around = np.stack([one.take(at) for one in named])
+    for number, core in cores.items():
+        around[number] |= dilate(core, AROUND).take(at)
     a, b, t, off = near.best(own, known, line, around)
     if shadow is not None:  # the same in shadow
         dark = near.best(
@@ -143,7 +146,7 @@ def _cores(
     line: int | None,
     named: Sequence[Mask],
 ) -> dict[int, Mask]:
-    """Return the areas that surely are a paint, by its number: labels near them name it."""
+    """Return the areas that surely are a paint, by its number: labels near name it, or its width."""
     like = np.zeros(there.shape, np.uint8)
     least = np.where(there, np.float32(LIKE**2), np.float32(-1))
     sure = np.zeros_like(there)
@@ -157,7 +160,9 @@ def _cores(
     cores = {}
     for number in np.unique(like[sure]).tolist():
         own = sure & (like == number)
-        core = own if number == line else own & (_counts(own) >= BAND) & named[number]
+        core, count = own, _counts(own)
+        if number != line:
+            core = own & (count >= BAND) & (named[number] | (count > AREA))
         if core.any():
             cores[number] = core
     return cores
@@ -243,7 +248,8 @@ class _Near:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return the two paints that explain each colour best, the second's share, how far off.
 
-        One paint, its shade or two of those that lie around; others only where these are far off.
+        One paint, its shade or two of those that lie around; others, alone or under ink, only where
+        these are far off.
         """
         a = self.common[0].copy()
         least = np.full(len(color), np.inf, np.float32)
@@ -263,13 +269,18 @@ class _Near:
             better = (self.count[j] > 0) & (away < least)
             a, b = (np.where(better, self.common[n], old) for n, old in ((i, a), (j, b)))
             t, least = np.where(better, share, t), np.where(better, away, least)
-        apart = np.stack([_apart(color, paint) for paint in known], axis=1)
-        apart[~named.T] = np.inf
-        like = apart.argmin(axis=1)
-        off = apart[np.arange(len(color)), like] + (ELSE * LIKE) ** 2
-        strange = (off <= (ELSE**2 + STRANGE**2) * LIKE**2) & (off < least)
-        a, b = (np.where(strange, like, old) for old in (a, b))
-        return a, b, np.where(strange, 0, t), np.where(strange, off, least)
+        off, share = (np.empty((len(known), len(color)), np.float32) for _ in range(2))
+        for number, paint in enumerate(known):
+            way = (paint if line is None else known[line]) - paint
+            share[number] = ((color - paint) @ way / max(float(way @ way), 1)).clip(0, 1)
+            off[number] = _apart(color, paint + share[number][:, None] * way)
+        off[~named] = np.inf
+        like, each = off.argmin(axis=0), np.arange(len(color))
+        off, share = off[like, each] + (ELSE * LIKE) ** 2, share[like, each]
+        strayed = np.where(share > 0, LIKE, STRANGE * LIKE)
+        strange = (off <= (ELSE * LIKE) ** 2 + strayed**2) & (off < least)
+        a, b = np.where(strange, like, a), np.where(strange, like if line is None else line, b)
+        return a, b, np.where(strange, share, t), np.where(strange, off, least)
 
 
 def _named(labelled: Mask) -> Mask:

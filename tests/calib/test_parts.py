@@ -212,6 +212,16 @@ def test_one_sure_view_settles_the_elevation_of_the_others():
     assert alone[0] > 0.2  # alone the torn view stays torn
 
 
+def test_the_more_alike_the_elevations_of_others_the_less_may_one_differ():
+    def of_the_odd_one(apart: float) -> float:
+        heights = 0.15 + apart * np.array([-1, 0.5, 1, -0.5, 0])
+        agreed = [candidates((pose_at(0.5 * i, e, 0.0), 0.0)) for i, e in enumerate(heights)]
+        odd = candidates((pose_at(1.5, 0.15, 0.0), 0.0), (pose_at(1.7, -0.06, 0.0), 0.0))
+        return float(sheet(6).probabilities([*agreed, odd])[5][1])
+
+    assert of_the_odd_one(math.radians(0.5)) < 0.5 * of_the_odd_one(math.radians(6.0))
+
+
 def test_a_drawing_too_faint_for_an_outline_is_refused_by_name():
     rgba = np.zeros((40, 40, 4), np.uint8)
     rgba[10:30, 20] = (0, 0, 0, 140)

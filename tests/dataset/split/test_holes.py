@@ -67,3 +67,11 @@ def test_a_speck_of_the_grain_in_a_gap_is_no_button() -> None:
     picture = standing(NAVY, (120, 110, 100), line=3)
     picture[310:312, 150:153] = (150, 145, 138)
     assert alpha_at(picture, 150, 330) == 0
+
+
+def test_cuffs_nearly_as_light_as_the_paper_lie_behind_their_line_and_the_gap_opens() -> None:
+    picture = standing(NAVY, None, line=3)
+    for corner, end in (((108, 362), (192, 390)), ((108, 262), (192, 276))):  # cuffs, a hem
+        cv2.rectangle(picture, corner, end, INK, 6)
+        cv2.rectangle(picture, corner, end, tuple(c - 20 for c in PAPER), -1)
+    assert alpha_at(picture, 150, 320) == 0
