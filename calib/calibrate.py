@@ -121,7 +121,7 @@ def _calibrate(
             found = find_cameras(views, body.mesh, options, progress, known)
             if mesh is not None and known.is_labels and not found.is_certain:
                 found = _unlabelled_if_better(views, body.mesh, found, known, options, progress)
-            better = without_body_if_better(
+            found, is_alone = without_body_if_better(
                 views,
                 found,
                 known,
@@ -131,11 +131,11 @@ def _calibrate(
                 options=options,
                 alone=first,
             )
-            if better is not None and mesh is None:
-                return _alone(views, better, hints, seed, options)
-            if better is not None:
+            if is_alone and mesh is None:
+                return _alone(views, found, hints, seed, options)
+            if is_alone:
                 origin = _origin(views, body, hints, seed, options)
-                refused = in_mannequin_world(better, views, body.mesh)
+                refused = in_mannequin_world(found, views, body.mesh)
                 return replace(refused, drawings=tuple(views), origin=origin)
     drawings, found = at_cuts(views, found)
     drawings, filled = fill_false_holes(drawings, found.views, found.mannequin)

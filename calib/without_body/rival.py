@@ -20,7 +20,9 @@ from toonset.view import View
 
 FEWEST = 2  # views: one says nothing by itself
 P_ELSEWHERE = 0.05  # that a sheet is not a turn that artists lay out
+CLEARLY = 3.0  # nats: drawings that are so much likelier than a mannequin that somebody gave
 REFUSED = "the mannequin is another body; cameras come from the drawings"
+ASK_ALONE = "the drawings alone are sure of their directions: try --mesh none"
 
 
 def tells_directions(views: Sequence[View], known: Known) -> bool:
@@ -42,13 +44,14 @@ def without_body_if_better(
     cues: Cues | None = None,
     options: CalibrationOptions = CalibrationOptions(),
     alone: Calibration | None = None,
-) -> Calibration | None:
-    """Return the calibration without a body if it explains the drawings better, else None.
+) -> tuple[Calibration, bool]:
+    """Return the calibration that explains the drawings better, and whether it has no body.
 
     A body that explains nothing loses to drawings that cohere; else paint, faces, detail, outlines
-    and layout decide. Nothing is tried where the mannequin's cameras are certain, or, where
-    somebody gave it or put it on a view, not failed; nor where landmarks, cameras or locks of the
-    whole sheet belong to it.
+    and layout decide, clearly against a mannequin that somebody gave: one that stays though the
+    drawings alone are sure says so. Nothing is tried where the mannequin's cameras are certain, or,
+    where somebody put it on a view, not failed; nor where landmarks, cameras or locks of the whole
+    sheet belong to it.
 
     Args:
         views: the drawings.
@@ -60,18 +63,23 @@ def without_body_if_better(
         options: what to doubt.
         alone: the calibration without a body, if it is known.
     """
-    fine = found.verdict != "failed" if given or any(known.placed) else found.is_certain
+    fine = found.verdict != "failed" if any(known.placed) else found.is_certain
     if fine or not tells_directions(views, known):
-        return None
+        return found, False
     cues = cues or Cues(views)
     alone = alone or calibrate_without_body(views, known, tell, cues, options)
-    explains = found.verdict != "failed"
-    worse = _odds(cues, alone, found, known) <= 0 if explains else alone.verdict == "failed"
+    if found.verdict == "failed":
+        worse = alone.verdict == "failed"
+    else:
+        worse = _odds(cues, alone, found, known) <= (CLEARLY if given else 0)
     if worse:
-        return None
-    if not given:
-        return alone
-    return replace(alone, reason=f"{REFUSED}; {alone.reason}" if alone.reason else REFUSED)
+        return _because(found, ASK_ALONE) if given and alone.is_certain else found, False
+    return _because(alone, REFUSED) if given else alone, True
+
+
+def _because(found: Calibration, why: str) -> Calibration:
+    """Return a calibration with a reason before its own."""
+    return replace(found, reason=f"{why}; {found.reason}" if found.reason else why)
 
 
 def _odds(cues: Cues, one: Calibration, other: Calibration, known: Known) -> float:

@@ -1,6 +1,8 @@
 """Cameras without a body: turns, labels, elevation, verdicts, and the bundle."""
 
 from collections.abc import Iterable
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +17,8 @@ from toonset.calib.options import VerdictThresholds
 from toonset.calib.without_body.find import calibrate_without_body
 from toonset.calib.without_body.placing import Figures, place
 from toonset.calib.without_body.posterior import label_doubt
-from toonset.calib.without_body.rival import REFUSED
+from toonset.calib.without_body import rival
+from toonset.calib.without_body.rival import ASK_ALONE, REFUSED, without_body_if_better
 from toonset.calib.without_body.turns import is_even, turn_hypotheses, wrapped
 from toonset.calib.write_bundle import write_bundle
 from toonset.camera import Camera
@@ -196,6 +199,22 @@ def test_a_body_that_explains_nothing_loses_to_none() -> None:
     tops = [view.camera.project(np.array([[0.0, 1.0, 0.0]]))[0][0] for view in given.views]
     heads = [np.nonzero(view.mask)[0].min() for view in given.drawings]
     np.testing.assert_allclose([top[1] for top in tops], heads, atol=3)
+
+
+@pytest.mark.parametrize("nats", [-2.0, 2.0, 4.0])
+def test_a_given_mannequin_in_doubt_yields_to_drawings_that_are_clearly_likelier(
+    nats: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    views = sheet(np.radians([0, 315, 270, 180]), 0.0)
+    alone = calibrate_without_body(views, Known())
+    found = replace(alone, verdict="weak", reason="1 of 4 weak")
+    monkeypatch.setattr(rival, "_odds", lambda *_: nats)
+    ask = partial(without_body_if_better, views, known=Known(), tell=lambda *_: None, alone=alone)
+    better, is_alone = ask(found, given=True)
+    assert is_alone == (nats > 3)
+    assert better.reason == (REFUSED if is_alone else f"{ASK_ALONE}; 1 of 4 weak")
+    assert ask(found, given=False) == ((alone, True) if nats > 0 else (found, False))
+    assert ask(alone, given=True) == (alone, False)  # certain: nothing is asked
 
 
 @pytest.mark.parametrize("degrees", [(0, 90, 180), (0, 315, 270, 180), (0, 270, 90, 180)])
