@@ -158,10 +158,10 @@ def _with_mesh(case: SpriteCase, known: Known) -> Calibration:
     found = find_cameras(case.views, case.mesh, known=known)
     if case.group == OWN_MESH:
         return found
-    better = without_body_if_better(
+    better, _ = without_body_if_better(
         case.views, found, known, given=False, tell=lambda step, share: None
     )
-    return better or found
+    return better
 
 
 def _records(sheets: list[Measured], recorder: Recorder) -> list[Record]:

@@ -146,7 +146,7 @@ def _cores(
     line: int | None,
     named: Sequence[Mask],
 ) -> dict[int, Mask]:
-    """Return the areas that surely are a paint, by its number: labels near name it, or its width."""
+    """Return the areas that surely are a paint, by its number: labels near, or width, name it."""
     like = np.zeros(there.shape, np.uint8)
     least = np.where(there, np.float32(LIKE**2), np.float32(-1))
     sure = np.zeros_like(there)

@@ -14,10 +14,10 @@ from toonset.calib.calibrate import calibrate
 from toonset.calib.hints import Hints
 from toonset.calib.known import Known
 from toonset.calib.options import VerdictThresholds
+from toonset.calib.without_body import rival
 from toonset.calib.without_body.find import calibrate_without_body
 from toonset.calib.without_body.placing import Figures, place
 from toonset.calib.without_body.posterior import label_doubt
-from toonset.calib.without_body import rival
 from toonset.calib.without_body.rival import ASK_ALONE, REFUSED, without_body_if_better
 from toonset.calib.without_body.turns import is_even, turn_hypotheses, wrapped
 from toonset.calib.write_bundle import write_bundle
