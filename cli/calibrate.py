@@ -22,6 +22,7 @@ from toonset.cli.common.cutting import (
     MattingOption,
     OutfitOption,
 )
+from toonset.cli.common.info_text import counted
 from toonset.cli.common.outfits import (
     about,
     check_outfit_output,
@@ -285,7 +286,7 @@ def _say_inputs(sheet: Sheet, mesh: Mesh | Literal["none"] | None, printer: Prin
     elif not isinstance(mesh, str):
         body = f"mannequin of {len(mesh.faces)} faces"
     count = len(sheet.views)
-    printer.say(f"{'1 view' if count == 1 else f'{count} views'}, {body}")
+    printer.say(f"{counted(count, 'view')}, {body}")
 
 
 def _say_result(found: Calibration, out: Path, printer: Printer) -> None:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
+from toonset.cli.common.info_text import counted
 from toonset.cli.common.output import (
     OUTPUT_PANEL,
     ForceFlag,
@@ -132,7 +133,8 @@ def synth(
     write_turnaround(made, out, force=force, test=test)
     height, width = made.sheet.shape[:2]
     count = len(made.views)
-    printer.say(f"{count} views, {len(made.palette)} colours, sheet {width} x {height} px")
+    found = f"{counted(count, 'view')}, {counted(len(made.palette), 'colour')}"
+    printer.say(f"{found}, sheet {width} x {height} px")
     printer.result({"folder": out, "views": count, "colors": len(made.palette)}, str(out))
 
 

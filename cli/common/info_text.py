@@ -13,6 +13,11 @@ MOST_COLORS, MOST_VIEWS, MOST_FILES = 16, 40, 10
 HUNDRED = 100.0
 
 
+def counted(number: int, thing: str) -> str:
+    """Return how many things there are, in words."""
+    return f"{number} {thing}" + "s" * (number != 1)
+
+
 def bundle_text(found: dict[str, Any]) -> str:
     """Return the facts of `toonset.dataset.bundle.summary.summarise` for people."""
     views = found["views"]
@@ -40,8 +45,8 @@ def run_line(found: dict[str, Any]) -> str:
     parts = [f"{found['path']}: {found['steps']} steps"]
     parts += [f"{name} {value:.4g}" for name, value in found["fit"].items() if _is_number(value)]
     views, colors = found["views"], found["palette"]
-    parts += [f"{len(views)} views"] if isinstance(views, list) else []
-    parts += [f"{len(colors)} colours"] if isinstance(colors, list) else ["no palette"]
+    parts += [counted(len(views), "view")] if isinstance(views, list) else []
+    parts += [counted(len(colors), "colour")] if isinstance(colors, list) else ["no palette"]
     parts += [found["verdict"]] if isinstance(found["verdict"], str) else []
     return ", ".join(parts)
 
@@ -122,7 +127,7 @@ def bytes_text(count: int) -> str:
 
 def _title(found: dict[str, Any]) -> str:
     count = len(found["views"])
-    views = "1 view" if count == 1 else f"{count} views"
+    views = counted(count, "view")
     what = "a bundle" if found["kind"] == "bundle" else f"cameras ({found['file']})"
     text = f"{found['path']}: {what} of {views}"
     if "verdict" not in found:
