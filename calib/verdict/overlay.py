@@ -21,7 +21,10 @@ from toonset.mesh import Mesh
 from toonset.view import View
 
 CELL_HEIGHT = 360  # pixels of a drawing in the overlay
-CAPTION = 82
+CAPTION, FOOT = 82, 26
+FONT_PX, GRAY = 14, (40, 40, 40)
+OF_MANNEQUIN = "Lines: the mannequin, as each camera sees it."
+OF_HULL = "Lines: where the other drawings let a body be, as each camera sees it."
 GAP = 14
 COLUMNS = 8
 LEAST_WIDTH = 150  # of a cell: its caption's
@@ -49,6 +52,7 @@ def draw_overlay(
         calibration: their cameras.
     """
     pairs = list(zip(views, calibration.views, strict=True))
+    legend = "" if mesh is None and len(views) == 1 else OF_HULL if mesh is None else OF_MANNEQUIN
     if mesh is not None:
         bodies = [_projected(view, found, mesh) for view, found in pairs]
     elif len(views) > 1:
@@ -58,14 +62,19 @@ def draw_overlay(
         bodies = [np.zeros((1, 1), dtype=bool)]
     cells = [_cell(view, found, body) for (view, found), body in zip(pairs, bodies, strict=True)]
     rows = [cells[i : i + COLUMNS] for i in range(0, len(cells), COLUMNS)]
-    width = max(sum(c.shape[1] + GAP for c in row) for row in rows) + GAP
-    picture = np.full((len(rows) * (CELL_HEIGHT + CAPTION + GAP) + GAP, width, 3), 255, np.uint8)
+    font = ImageFont.load_default(FONT_PX)
+    width = max(math.ceil(font.getlength(legend)), *(sum(c.shape[1] for c in r) for r in rows))
+    width += GAP * (max(map(len, rows)) + 1)
+    height = len(rows) * (CELL_HEIGHT + CAPTION + GAP) + GAP
+    picture = np.full((height + (FOOT if legend else 0), width, 3), 255, np.uint8)
     for r, row in enumerate(rows):
         x, y = GAP, GAP + r * (CELL_HEIGHT + CAPTION + GAP)
         for cell in row:
             picture[y : y + cell.shape[0], x : x + cell.shape[1]] = cell
             x += cell.shape[1] + GAP
-    return picture
+    image = Image.fromarray(picture)
+    ImageDraw.Draw(image).text((GAP, height), legend, fill=GRAY, font=font)
+    return np.asarray(image)
 
 
 def _cell(view: View, found: ViewCalibration, body: Body) -> UInt8[np.ndarray, "height width 3"]:
@@ -139,14 +148,13 @@ def _captioned(
     pen = ImageDraw.Draw(image)
     yaw, elevation, roll = (math.degrees(angle) for angle in found.camera.angles)
     sigmas = found.sigmas
-    gray = (40, 40, 40)
     lines = [
         (f"{found.name[:-4]}  {found.verdict}", INK[found.verdict]),
-        (f"yaw {round(yaw, 1) % 360:.1f}° ± {math.degrees(sigmas.yaw):.1f}°", gray),
-        (f"elev. {elevation:.1f}° ± {math.degrees(sigmas.elevation):.1f}°", gray),
-        (f"roll {roll:.1f}° ± {math.degrees(sigmas.roll):.1f}°", gray),
+        (f"yaw {round(yaw, 1) % 360:.1f}° ± {math.degrees(sigmas.yaw):.1f}°", GRAY),
+        (f"elev. {round(elevation, 1) + 0.0:.1f}° ± {math.degrees(sigmas.elevation):.1f}°", GRAY),
+        (f"roll {round(roll, 1) + 0.0:.1f}° ± {math.degrees(sigmas.roll):.1f}°", GRAY),
     ]
     for i, (text, color) in enumerate(lines):
-        font = ImageFont.load_default(17 if i == 0 else 14)
+        font = ImageFont.load_default(17 if i == 0 else FONT_PX)
         pen.text((6, CELL_HEIGHT + 2 + 19 * i), text, fill=color, font=font)
     return np.array(image)
