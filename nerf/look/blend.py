@@ -274,6 +274,7 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
         unlined = _unlined(looks, np.where(kept, chosen, -1), alpha > SOLID, figure_px)
         cover = missing_lines(unlined, drawings.lined_pairs, line.width_px * scale)
         if stepped:
+            unlined = unlined.gone_on(alpha > SOLID)
             hidden = missing_steps(unlined, depth, drawings.height, line.width_px * scale)
             cover = np.maximum(cover, hidden)
         label, rgb = drawings.ink(line)

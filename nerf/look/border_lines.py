@@ -11,7 +11,7 @@ drawn along deep steps in depth that no line is near.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -69,6 +69,12 @@ class Unlined:
         lined = lines_of(paint, pen) & inside
         kept = inside & ~lined if (inside & ~lined).any() else np.ones_like(inside)
         return cls(taken(labels, nearest(kept)), lined, inside, figure_px)
+
+    def gone_on(self, inside: Mask) -> Unlined:
+        """Return the paints, which go on into the rest of the figure: no drawing shows it."""
+        if not self.inside.any():
+            return self
+        return replace(self, labels=taken(self.labels, nearest(self.inside)), inside=inside)
 
     def borders(self) -> UInt16[np.ndarray, "height width"]:
         """Return every pixel's pair of paints, whose border it lies at; NONE elsewhere."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -88,3 +90,13 @@ def test_a_line_along_a_part_of_a_step_goes_on() -> None:
     cover = missing_steps(*hiding(0.2, slice(0, 50)), 1.0, PEN)
     assert cover[55:90].max(axis=1).min() == pytest.approx(1)
     assert cover[:45].sum() == 0
+
+
+def test_a_line_goes_on_where_no_drawing_shows_the_step() -> None:
+    unlined, depth = hiding(0.2)
+    unseen = np.zeros_like(INSIDE)
+    unseen[46:54, 36:46] = True
+    torn = replace(unlined, inside=~unseen, labels=np.where(unseen, 2, unlined.labels))
+    assert missing_steps(torn, depth, 1.0, PEN)[47:53].sum() == 0
+    cover = missing_steps(torn.gone_on(INSIDE), depth, 1.0, PEN)
+    assert cover[10:90].sum(axis=1) == pytest.approx(PEN, abs=0.8)
