@@ -67,7 +67,7 @@ def test_shown_commands_exist(document: str) -> None:
 
 def test_demo_commands_exist() -> None:
     steps = steps_of_the_demo()
-    assert [words[0] for words in steps] == ["calibrate", "palette", "train", "render", "view"]
+    assert [words[0] for words in steps] == ["calibrate", "palette", "train", "view", "render"]
     assert [c for words in steps if (c := complaint(words))] == []
 
 
