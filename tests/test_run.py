@@ -114,8 +114,8 @@ def test_demo_goes_on_after_an_uncertain_view(checkout: Path) -> None:
         "[calibrate",
         "[palette",
         "[train",
-        "[render",
         "[view",
+        "[render",
     ]
     assert "$ ./run calibrate examples/sheet.png" in done.stdout
     assert "weak or ambiguous" in done.stderr
@@ -161,7 +161,7 @@ def test_the_wheel_is_built_installed_and_tried_outside_of_the_tree(checkout: Pa
     assert len(places) == 1
     assert not Path(places.pop()).exists()  # a temporary one
     assert [line.split("]")[0] for line in log_of(checkout)[1::2]] == [
-        *("[calibrate", "[palette", "[train", "[render", "[view")
+        *("[calibrate", "[palette", "[train", "[view", "[render")
     ]
     python_that(checkout, 'case "$*" in *wheel.py*) exit 4 ;; esac')
     assert run(checkout, "wheel").returncode == 4
