@@ -142,8 +142,18 @@ def _open_streams() -> None:
 def _end_by_signals() -> None:
     """Let signals that end a program end it as Ctrl-C does: what is half-written goes.
 
-    They are put off while trimesh runs: it catches whatever is raised where it loads others.
+    They are put off while trimesh runs: it catches whatever is raised where it loads others. Where
+    one comes while Python clears an object away, which may raise nothing, it is sent again.
     """
+    ignored = sys.unraisablehook
+
+    def again(lost: sys.UnraisableHookArgs) -> None:
+        if isinstance(lost.exc_value, Ended):
+            threading.Timer(NAP_S, _send, [int(str(lost.exc_value)) - BY_SIGNAL]).start()
+        elif isinstance(lost.exc_value, KeyboardInterrupt):
+            threading.Timer(NAP_S, _send, [signal.SIGINT]).start()
+        else:
+            ignored(lost)
 
     def end(number: int, frame: FrameType | None) -> None:
         if _is_within(CATCHES_ALL, frame):
@@ -153,6 +163,7 @@ def _end_by_signals() -> None:
         else:
             raise Ended(BY_SIGNAL + number)
 
+    sys.unraisablehook = again
     for number in (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
         with contextlib.suppress(ValueError):  # not in the main thread
             if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):

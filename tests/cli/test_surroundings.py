@@ -160,3 +160,20 @@ def test_a_key_pressed_while_modules_load_ends_without_a_word(folder):
     pipes = {"capture_output": True, "text": True, "preexec_fn": heard(signal.SIGINT)}
     done = subprocess.run(program, cwd=folder, **pipes)
     assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
+
+
+def test_a_signal_while_an_object_is_cleared_away_is_not_lost() -> None:
+    script = (
+        "import os, signal, time\n"
+        "from toonset.cli.main import _end_by_signals\n"
+        "_end_by_signals()\n"
+        "class Cleared:\n"
+        "    def __del__(self):\n"
+        "        os.kill(os.getpid(), signal.SIGTERM)\n"
+        "        time.sleep(0.01)\n"
+        "Cleared()\n"
+        "time.sleep(60)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, timeout=50)
+    assert done.returncode == 143
+    assert done.stderr == b""
