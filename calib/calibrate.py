@@ -25,7 +25,7 @@ from toonset.calib.verdict.checks import check_names, off_labels
 from toonset.calib.without_body.cues import Cues
 from toonset.calib.without_body.find import calibrate_without_body
 from toonset.calib.without_body.mannequin_world import in_mannequin_world
-from toonset.calib.without_body.rival import tells_directions, without_body_if_better
+from toonset.calib.without_body.rival import tells_directions, with_body_or_without
 from toonset.dataset.bundle.transforms_read import transforms_file
 from toonset.dataset.mannequin.files import landmarks_path
 from toonset.dataset.mannequin.landmark_file import read_known_points
@@ -121,7 +121,7 @@ def _calibrate(
             found = find_cameras(views, body.mesh, options, progress, known)
             if mesh is not None and known.is_labels and not found.is_certain:
                 found = _unlabelled_if_better(views, body.mesh, found, known, options, progress)
-            found, is_alone = without_body_if_better(
+            found, has_no_body = with_body_or_without(
                 views,
                 found,
                 known,
@@ -131,9 +131,9 @@ def _calibrate(
                 options=options,
                 alone=first,
             )
-            if is_alone and mesh is None:
+            if has_no_body and mesh is None:
                 return _alone(views, found, hints, seed, options)
-            if is_alone:
+            if has_no_body:
                 origin = _origin(views, body, hints, seed, options)
                 refused = in_mannequin_world(found, views, body.mesh)
                 return replace(refused, drawings=tuple(views), origin=origin)

@@ -22,7 +22,6 @@ from toonset.cli.common.cutting import (
     MattingOption,
     OutfitOption,
 )
-from toonset.cli.common.info_text import counted
 from toonset.cli.common.outfits import (
     about,
     check_outfit_output,
@@ -41,6 +40,7 @@ from toonset.cli.common.output import (
     SeedOption,
     UpOption,
     VerboseFlag,
+    counted,
 )
 from toonset.symmetric import Symmetric
 

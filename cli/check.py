@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from toonset.cli.common.output import JsonFlag, Printer, QuietFlag
+from toonset.cli.common.output import JsonFlag, Printer, QuietFlag, counted
 from toonset.errors import BundleError
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ def check(
     problems = _problems(bundle)
     width = max((len(problem.where) for problem in problems), default=0)
     lines = [f"{problem.where:{width}}  {problem.what}" for problem in problems]
-    count = "no problem" if not problems else f"{len(problems)} problem" + "s" * (len(lines) > 1)
+    count = counted(len(problems), "problem") if problems else "no problem"
     if not quiet:
         lines.append(f"{bundle}: {count}")
     found = [{"where": problem.where, "what": problem.what} for problem in problems]

@@ -18,6 +18,7 @@ from toonset.cli.common.output import (
     QuietFlag,
     SeedOption,
     UpOption,
+    counted,
 )
 from toonset.write import check_output
 
@@ -211,7 +212,7 @@ def _summary(to: Format, job: Job, views: Sequence[ExportView], error_px: float)
     """Return what a person should know, line by line."""
     target = TARGETS[to]
     far = sum(view.camera.is_orthographic for view in views)
-    lines = [f"{len(views)} {'view' if len(views) == 1 else 'views'}"]
+    lines = [counted(len(views), "view")]
     if far and to == Format.nerfstudio and target.holds_exactly(job):
         lines.append("orthographic (ORTHOPHOTO); for splatfacto, which knows none, add --pinholes")
     elif far and not target.holds_exactly(job):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag
+from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag, counted
 from toonset.write import check_output
 
 if TYPE_CHECKING:
@@ -71,9 +71,8 @@ def import_(
 
 
 def _summary(imported: Imported, report: ImportReport, *, has_mannequin: bool) -> str:
-    count = len(report.views)
     exact = ", exact cameras of toonset.json" if imported.native is not None else ""
-    lines = [f"{count} {'view' if count == 1 else 'views'} of {imported.program}{exact}"]
+    lines = [f"{counted(len(report.views), 'view')} of {imported.program}{exact}"]
     if report.masked:
         lines.append(f"{report.masked} with a mask as alpha")
     if report.opaque:

@@ -91,6 +91,11 @@ def main() -> None:
 class Ended(SystemExit):
     """The program is ended by a signal: whatever is being written is cleared away first."""
 
+    def __init__(self, number: int) -> None:
+        """Take the signal's number."""
+        super().__init__(BY_SIGNAL + number)
+        self.number = number
+
 
 def run(program: typer.Typer, name: str) -> None:
     """Run a program of verbs and leave with its exit code; mistakes are one line on stderr."""
@@ -107,7 +112,7 @@ def run(program: typer.Typer, name: str) -> None:
             code = program(prog_name=name, standalone_mode=False)
         sys.stdout.flush()
     except Ended as ended:
-        _say(name, f"ended by {signal.Signals(int(str(ended)) - BY_SIGNAL).name}")
+        _say(name, f"ended by {signal.Signals(ended.number).name}")
         raise
     except KeyboardInterrupt:  # outside of typer, which catches it within
         code = INTERRUPTED
@@ -142,28 +147,32 @@ def _open_streams() -> None:
 def _end_by_signals() -> None:
     """Let signals that end a program end it as Ctrl-C does: what is half-written goes.
 
-    They are put off while trimesh runs: it catches whatever is raised where it loads others. Where
-    one comes while Python clears an object away, which may raise nothing, it is sent again.
+    They are sent again a little later where what they raise would be lost: while trimesh runs,
+    which catches whatever is raised where it loads others, and in finalizers (`__del__`, callbacks
+    of weak references), where Python only prints it.
     """
-    ignored = sys.unraisablehook
+    print_unraisable = sys.unraisablehook
 
-    def again(lost: sys.UnraisableHookArgs) -> None:
+    def send_later(number: int) -> None:
+        threading.Timer(NAP_S, _send, [number]).start()
+
+    def unraisable(lost: sys.UnraisableHookArgs) -> None:
         if isinstance(lost.exc_value, Ended):
-            threading.Timer(NAP_S, _send, [int(str(lost.exc_value)) - BY_SIGNAL]).start()
+            send_later(lost.exc_value.number)
         elif isinstance(lost.exc_value, KeyboardInterrupt):
-            threading.Timer(NAP_S, _send, [signal.SIGINT]).start()
+            send_later(signal.SIGINT)
         else:
-            ignored(lost)
+            print_unraisable(lost)
 
     def end(number: int, frame: FrameType | None) -> None:
         if _is_within(CATCHES_ALL, frame):
-            threading.Timer(NAP_S, _send, [number]).start()
+            send_later(number)
         elif number == signal.SIGINT:
             raise KeyboardInterrupt
         else:
-            raise Ended(BY_SIGNAL + number)
+            raise Ended(number)
 
-    sys.unraisablehook = again
+    sys.unraisablehook = unraisable
     for number in (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
         with contextlib.suppress(ValueError):  # not in the main thread
             if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):

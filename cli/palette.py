@@ -18,6 +18,7 @@ from toonset.cli.common.output import (
     Printer,
     QuietFlag,
     VerboseFlag,
+    counted,
 )
 from toonset.errors import UsageError
 from toonset.lock import FOLDERS
@@ -242,8 +243,7 @@ def recolor(
             new = recolor_drawing(one.picture, one.paint, one.contour, found, colors)
             write_bytes(folder / one.name, encode_png(new))
     names = [one.name for one in drawings]
-    count = "1 picture" if len(names) == 1 else f"{len(names)} pictures"
-    printer.result({"out": out, "files": names}, f"{out}: {count}")
+    printer.result({"out": out, "files": names}, f"{out}: {counted(len(names), 'picture')}")
 
 
 def _painted(places: list[Path], printer: Printer) -> tuple[Palette, list[Painted]]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag
+from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag, counted
 from toonset.errors import did_you_mean
 from toonset.nerf.options import FORMATS, LAYERS, Layer
 from toonset.write import check_output
@@ -170,7 +170,7 @@ def _report(
         extra.insert(
             0, f"{len(traced)} SVG ({math.ceil(sum(sizes[name] for name in traced) / 1000)} kB)"
         )
-    shown = f"{len(files)} {'picture' if len(files) == 1 else 'pictures'} ({', '.join(layers)})"
+    shown = f"{counted(len(files), 'picture')} ({', '.join(layers)})"
     values = {"out": out, "layer": layers[0], "layers": layers, "files": files, "svg": traced}
     said = ", ".join([f"{out}: {shown}", *extra])
     printer.result({**values, "together": together}, said)

@@ -8,7 +8,6 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from toonset.cli.common.info_text import counted
 from toonset.cli.common.output import (
     OUTPUT_PANEL,
     ForceFlag,
@@ -17,6 +16,7 @@ from toonset.cli.common.output import (
     QuietFlag,
     SeedOption,
     UpOption,
+    counted,
 )
 from toonset.dataset.synthetic.artist_options import ArtistOptions
 from toonset.dataset.synthetic.options import CONDITIONS, SynthOptions

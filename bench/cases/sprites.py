@@ -28,7 +28,7 @@ from toonset.calib.outline.occluding_contour import prepare_surface
 from toonset.calib.result import SEVERITY, Calibration
 from toonset.calib.search.template_cache import load_bank
 from toonset.calib.without_body.find import calibrate_without_body
-from toonset.calib.without_body.rival import without_body_if_better
+from toonset.calib.without_body.rival import with_body_or_without
 from toonset.dataset.images.picture import load_rgba
 from toonset.dataset.mannequin.make import default_mannequin
 from toonset.dataset.mesh.load import load_mesh
@@ -158,7 +158,7 @@ def _with_mesh(case: SpriteCase, known: Known) -> Calibration:
     found = find_cameras(case.views, case.mesh, known=known)
     if case.group == OWN_MESH:
         return found
-    better, _ = without_body_if_better(
+    better, _ = with_body_or_without(
         case.views, found, known, given=False, tell=lambda step, share: None
     )
     return better

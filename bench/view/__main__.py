@@ -51,7 +51,7 @@ def main(runs: Annotated[list[Path], typer.Argument(help="Run folders.")]) -> No
             file, began = Path(place) / "page.html", time.process_time()
             file.write_text(view_html(run), encoding="utf-8")
             seconds = time.process_time() - began
-            page = browser.new_page(
+            page = browser.new_page(  # that does not turn by itself between two saved pictures
                 viewport={"width": 1000, "height": 800}, reduced_motion="reduce"
             )
             page.add_init_script(FIRST)

@@ -2,7 +2,7 @@
 
 Two things tie the views together, both unknown and summed out on a grid:
 
-- one elevation, up to a few degrees, the fewer the more the views agree: it separates twins
+- one elevation, about which the views spread by 2 or 4 degrees: it separates twins
   (yaw -> 180 - yaw, elevation -> -elevation) unless all views flip together;
 - where the views are meant to be seen from: what a person says (labels), else an evenly spaced
   turn, yaw_i = start +- i * 360 / views, in either direction. Most sheets are one (and most start
@@ -30,7 +30,7 @@ from toonset.camera import angles_from_rotation
 from toonset.dataset.split_folder.view_labels import Label, label_rows
 
 ELEVATION_GRID = np.radians(np.arange(-30.0, 61.0, 1.25))
-ELEVATION_SIGMAS = np.radians([2.0, 4.0])  # of views about their sheet's elevation: either one
+ELEVATION_SIGMAS = np.radians([2.0, 4.0])  # of views about their sheet's elevation; equally likely
 TURN_VIEWS = 4  # fewer views make no turn
 TURN_STARTS = 36  # of the first view's yaw
 TURN_SIGMA = np.radians(8.0)  # of a view about its place

@@ -23,8 +23,8 @@ from toonset.view import View
 CELL_HEIGHT = 360  # pixels of a drawing in the overlay
 CAPTION, FOOT = 82, 26
 FONT_PX, GRAY = 14, (40, 40, 40)
-OF_MANNEQUIN = "Lines: the mannequin, as each camera sees it."
-OF_HULL = "Lines: where the other drawings let a body be, as each camera sees it."
+OF_MANNEQUIN = "Lines: the mannequin's outline from each camera."
+OF_HULL = "Lines: the outline that the other drawings leave room for (their visual hull)."
 GAP = 14
 COLUMNS = 8
 LEAST_WIDTH = 150  # of a cell: its caption's
@@ -52,10 +52,12 @@ def draw_overlay(
         calibration: their cameras.
     """
     pairs = list(zip(views, calibration.views, strict=True))
-    legend = "" if mesh is None and len(views) == 1 else OF_HULL if mesh is None else OF_MANNEQUIN
+    legend = ""
     if mesh is not None:
+        legend = OF_MANNEQUIN
         bodies = [_projected(view, found, mesh) for view, found in pairs]
     elif len(views) > 1:
+        legend = OF_HULL
         silhouettes = [Silhouette(view, found.camera) for view, found in pairs]
         bodies = [_hull(view, silhouettes, i) for i, view in enumerate(views)]
     else:
@@ -63,8 +65,8 @@ def draw_overlay(
     cells = [_cell(view, found, body) for (view, found), body in zip(pairs, bodies, strict=True)]
     rows = [cells[i : i + COLUMNS] for i in range(0, len(cells), COLUMNS)]
     font = ImageFont.load_default(FONT_PX)
-    width = max(math.ceil(font.getlength(legend)), *(sum(c.shape[1] for c in r) for r in rows))
-    width += GAP * (max(map(len, rows)) + 1)
+    width = max(sum(c.shape[1] + GAP for c in row) for row in rows) + GAP
+    width = max(width, math.ceil(font.getlength(legend)) + 2 * GAP)
     height = len(rows) * (CELL_HEIGHT + CAPTION + GAP) + GAP
     picture = np.full((height + (FOOT if legend else 0), width, 3), 255, np.uint8)
     for r, row in enumerate(rows):

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import logit, logsumexp
 
 from toonset.calib.known import Known
 from toonset.calib.options import CalibrationOptions, Progress
@@ -20,9 +20,8 @@ from toonset.view import View
 
 FEWEST = 2  # views: one says nothing by itself
 P_ELSEWHERE = 0.05  # that a sheet is not a turn that artists lay out
-CLEARLY = 3.0  # nats: drawings that are so much likelier than a mannequin that somebody gave
 REFUSED = "the mannequin is another body; cameras come from the drawings"
-ASK_ALONE = "the drawings alone are sure of their directions: try --mesh none"
+ASK_ALONE = "without the mannequin every view is certain; try --mesh none"
 
 
 def tells_directions(views: Sequence[View], known: Known) -> bool:
@@ -34,7 +33,7 @@ def tells_directions(views: Sequence[View], known: Known) -> bool:
     return len(views) >= FEWEST and not of_mannequin
 
 
-def without_body_if_better(
+def with_body_or_without(
     views: Sequence[View],
     found: Calibration,
     known: Known,
@@ -48,10 +47,10 @@ def without_body_if_better(
     """Return the calibration that explains the drawings better, and whether it has no body.
 
     A body that explains nothing loses to drawings that cohere; else paint, faces, detail, outlines
-    and layout decide, clearly against a mannequin that somebody gave: one that stays though the
-    drawings alone are sure says so. Nothing is tried where the mannequin's cameras are certain, or,
-    where somebody put it on a view, not failed; nor where landmarks, cameras or locks of the whole
-    sheet belong to it.
+    and layout decide. A mannequin that somebody gave loses where the drawings alone are right with
+    the probability `thresholds.sure`; one that stays though every view is certain without it says
+    so. Nothing is tried where the mannequin's cameras are certain, or, where somebody put it on a
+    view, not failed; nor where landmarks, cameras or locks of the whole sheet belong to it.
 
     Args:
         views: the drawings.
@@ -71,7 +70,8 @@ def without_body_if_better(
     if found.verdict == "failed":
         worse = alone.verdict == "failed"
     else:
-        worse = _odds(cues, alone, found, known) <= (CLEARLY if given else 0)
+        least = logit(options.thresholds.sure) if given else 0.0
+        worse = _odds(cues, alone, found, known) <= least
     if worse:
         return _because(found, ASK_ALONE) if given and alone.is_certain else found, False
     return _because(alone, REFUSED) if given else alone, True

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from toonset.cli.common.output import OUTPUT_PANEL, JsonFlag, Printer, QuietFlag
+from toonset.cli.common.output import OUTPUT_PANEL, JsonFlag, Printer, QuietFlag, counted
 from toonset.errors import OutputError, ToonsetError, UsageError
 
 if TYPE_CHECKING:
@@ -346,11 +346,11 @@ def _run(
         release_dead(table, wanted.out, runner.ident)
         _plan(table, wanted, printer)
 
-        def counted() -> dict[str, Counter[str]]:
+        def states() -> dict[str, Counter[str]]:
             mine = (row for row in table.rows() if row.name in wanted.names)
             return count_stages(mine, wanted.stages)
 
-        progress = Progress(printer, counted())
+        progress = Progress(printer, states())
         if table.is_due():
             workers = stack.enter_context(closing(start(wanted)))
             page = _Page(wanted, table)
@@ -364,12 +364,12 @@ def _run(
             except (KeyboardInterrupt, SystemExit, ToonsetError) as error:
                 workers.close()
                 with suppress(ToonsetError):  # the page must not say that sheets run
-                    progress.close(counted())
+                    progress.close(states())
                     _write_page(wanted, table)
                 if not isinstance(error, ToonsetError):
                     printer.say("the same command continues")
                 raise
-        progress.close(counted())
+        progress.close(states())
         _write_page(wanted, table)
         return progress.counts
 
@@ -393,7 +393,6 @@ def _check_out(out: Path) -> None:
 
 def _plan(table: Table, wanted: Wanted, printer: Printer) -> None:
     """Put into the table what is to be done."""
-    from toonset.cli.batch.progress import sheets_of
     from toonset.cli.batch.sheets import some_of
     from toonset.cli.batch.stages import keys_of
     from toonset.cli.batch.table import Plan
@@ -415,7 +414,9 @@ def _plan(table: Table, wanted: Wanted, printer: Printer) -> None:
                 printer.progress(f"reading sheets {position + 1}/{len(wanted.entries)}")
     hashes.keep()
     if other := sorted(names - {entry.name for entry in wanted.entries}):
-        said = f"{sheets_of(len(other))} not named now, kept ({some_of(other)}); see --forget"
+        said = (
+            f"{counted(len(other), 'sheet')} not named now, kept ({some_of(other)}); see --forget"
+        )
         printer.say(said)
     if wanted.retry:
         table.retry(wanted.names, wanted.stages)
@@ -469,13 +470,11 @@ def _write_page(wanted: Wanted, table: Table) -> None:
 
 def _report(wanted: Wanted, counts: Mapping[str, Counter[str]], printer: Printer) -> None:
     """Print the result; exit with 3 where sheets failed."""
-    from toonset.cli.batch.progress import sheets_of
-
     found = {stage: {k: n for k, n in count.items() if n} for stage, count in counts.items()}
     bad = sum(count[state] for count in counts.values() for state in ("failed", "quarantined"))
     look = "" if wanted.is_shard else f": look at {wanted.out / 'index.html'}"
     again = "; mend them, or --retry-failed" if bad else ""
-    text = f"{wanted.out}: {sheets_of(len(wanted.names))}, {bad} failed{look}{again}"
+    text = f"{wanted.out}: {counted(len(wanted.names), 'sheet')}, {bad} failed{look}{again}"
     values = {"out": wanted.out, "sheets": len(wanted.names), "failed": bad, "stages": found}
     printer.result(values, text)
     if bad:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag
+from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag, counted
 from toonset.errors import OutputError, ToonsetError, UsageError
 from toonset.write import check_output, new_folder, write_bytes
 
@@ -85,7 +85,6 @@ def pack(
     README.md and card.json say what is in it and how it is loaded. The same sheets give the same
     bytes, and a character stays in its split when sheets are added.
     """
-    from toonset.cli.batch.progress import sheets_of
     from toonset.cli.batch.shards import check_parquet
 
     printer, shares = Printer(as_json, quiet), _shares(split)
@@ -99,7 +98,7 @@ def pack(
             card = _write(folder, wanted, to, chosen, tally, shard_size * MB, printer)
     splits = {name: card["splits"][name]["sheets"] for name in card["splits"]}
     told = ", ".join(f"{name} {count}" for name, count in splits.items())
-    printer.say(f"{sheets_of(card['sheets'])}, {card['views']} views: {told}")
+    printer.say(f"{counted(card['sheets'], 'sheet')}, {counted(card['views'], 'view')}: {told}")
     for name, share in zip(SPLITS, shares, strict=True):
         if share and name not in splits:
             printer.say(f"{name} is empty: no character fell into its share of {share:g}")

@@ -112,8 +112,3 @@ def _duration(seconds: float) -> str:
     from toonset.nerf.train.progress import duration
 
     return duration(seconds)
-
-
-def sheets_of(count: int) -> str:
-    """Return how many sheets, in words."""
-    return f"{count:,} {'sheet' if count == 1 else 'sheets'}"

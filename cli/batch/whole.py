@@ -11,10 +11,9 @@ from typing import Any
 
 from toonset.cli.batch.dispatch import PICTURES, THUMBS
 from toonset.cli.batch.page import write_page
-from toonset.cli.batch.progress import sheets_of
 from toonset.cli.batch.sheets import named
 from toonset.cli.batch.table import BAD, SHARDS, TABLE, SheetRow, Table, tables_in
-from toonset.cli.common.output import Printer
+from toonset.cli.common.output import Printer, counted
 from toonset.errors import UsageError
 
 VERDICTS = ("ok", "weak", "ambiguous", "failed", "none")
@@ -57,7 +56,7 @@ class Status:
         """Return it for people."""
         total = sum(self.sheets.values())
         said = ", ".join(f"{self.verdicts[v]} {v}" for v in VERDICTS if self.verdicts[v])
-        found = [f"{sheets_of(total)}: {_said(self.sheets)}", f"cameras: {said}"]
+        found = [f"{counted(total, 'sheet')}: {_said(self.sheets)}", f"cameras: {said}"]
         for stage, count in self.stages.items():
             mean, peak = self.wall_s[stage] / max(count["done"], 1), self.peak_mb[stage]
             each = f"; {mean:.1f} s each, {peak:.0f} MB at most" if count["done"] else ""
@@ -95,7 +94,9 @@ def merge(out: Path, printer: Printer) -> None:
     parts = int(shards[0].partition("of")[2].removesuffix(".sqlite"))
     if len(shards) < parts:
         printer.say(f"{parts - len(shards)} of {parts} parts are missing")
-    text = f"{out}: {sheets_of(count)} from {len(shards)} parts; look at {out / 'index.html'}"
+    text = (
+        f"{out}: {counted(count, 'sheet')} from {len(shards)} parts; look at {out / 'index.html'}"
+    )
     printer.result({"out": out, "sheets": count, "parts": len(shards)}, text)
 
 

@@ -6,16 +6,12 @@ from collections.abc import Sequence
 from itertools import zip_longest
 from typing import Any
 
+from toonset.cli.common.output import counted
 from toonset.errors import printable
 
 NAME_WIDTH = 10  # of the left column below the table
 MOST_COLORS, MOST_VIEWS, MOST_FILES = 16, 40, 10
 HUNDRED = 100.0
-
-
-def counted(number: int, thing: str) -> str:
-    """Return how many things there are, in words."""
-    return f"{number} {thing}" + "s" * (number != 1)
 
 
 def bundle_text(found: dict[str, Any]) -> str:
@@ -127,9 +123,8 @@ def bytes_text(count: int) -> str:
 
 def _title(found: dict[str, Any]) -> str:
     count = len(found["views"])
-    views = counted(count, "view")
     what = "a bundle" if found["kind"] == "bundle" else f"cameras ({found['file']})"
-    text = f"{found['path']}: {what} of {views}"
+    text = f"{found['path']}: {what} of {counted(count, 'view')}"
     if "verdict" not in found:
         return text
     return f"{text}, {found['verdict']}" + (f" ({found['reason']})" if found["reason"] else "")

@@ -60,7 +60,7 @@ class BorderLook:
     Attributes:
         ink: dark pixels within 3 px.
         near: pixels within 3 px.
-        shades: pixels 3 to 4 px away that are nearly background, no ink between; nearer, the edge
+        shades: those of `far` that are nearly background, with no ink between; nearer, the edge
             itself is soft.
         far: pixels 3 to 4 px away.
     """
@@ -269,13 +269,13 @@ def _look(
 ) -> BorderLook:
     reach = [dilate(empty, steps) for steps in (2, 3, 4)]
     near, far = reach[1] & solid, reach[2] & ~reach[0] & solid
-    bare = empty
+    on_this_side = empty
     for _ in range(4):
-        bare = dilate(bare) & (empty | (luma >= INK_LUMA))
+        on_this_side = dilate(on_this_side) & (empty | (luma >= INK_LUMA))
     return BorderLook(
         int((luma[near] < INK_LUMA).sum()),
         int(near.sum()),
-        int((contrast[far & bare] < SOFT_SHADE).sum()),
+        int((contrast[far & on_this_side] < SOFT_SHADE).sum()),
         int(far.sum()),
     )
 

@@ -274,7 +274,6 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
         unlined = _unlined(looks, np.where(kept, chosen, -1), alpha > SOLID, figure_px)
         cover = missing_lines(unlined, drawings.lined_pairs, line.width_px * scale)
         if stepped:
-            unlined = unlined.gone_on(alpha > SOLID)
             hidden = missing_steps(unlined, depth, drawings.height, line.width_px * scale)
             cover = np.maximum(cover, hidden)
         label, rgb = drawings.ink(line)
@@ -318,7 +317,7 @@ def _unlined(
             places, own = (look.x, look.y), look.texture.unlined
             for whole, its in ((labels, own.labels), (lined, own.lined.view(np.uint8))):
                 cv2.copyTo(sample_picture(its, places, cv2.INTER_NEAREST), here, whole)
-    return Unlined(labels, lined > 0, inside & (chosen >= 0), px)
+    return Unlined(labels, lined > 0, inside & (chosen >= 0), px).extended(inside)
 
 
 def _posed(

@@ -70,8 +70,8 @@ class Unlined:
         kept = inside & ~lined if (inside & ~lined).any() else np.ones_like(inside)
         return cls(taken(labels, nearest(kept)), lined, inside, figure_px)
 
-    def gone_on(self, inside: Mask) -> Unlined:
-        """Return the paints, which go on into the rest of the figure: no drawing shows it."""
+    def extended(self, inside: Mask) -> Unlined:
+        """Return the paints extended into the pixels of a figure that no drawing shows."""
         if not self.inside.any():
             return self
         return replace(self, labels=taken(self.labels, nearest(self.inside)), inside=inside)

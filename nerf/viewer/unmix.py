@@ -28,11 +28,11 @@ BETTER = 1.15  # a mixture explains a colour so much better, squared, or it is n
 LINELESS = 2.0  # the same of one without the line's colour, where there are lines
 FAR = 26.0  # levels of 255: a colour so far from all shades of its mixture is none of it
 ELSE = 2.0  # times LIKE: so much worse is a paint that is not around
-STRANGE = 2.5  # times LIKE: what is not so like it is not that paint; under ink, once
+STRANGE = 2.5  # times LIKE: what is not so like it is not that paint (under ink: 1)
 SHADED = 1.5  # times LIKE: so much worse is a shade of a paint
 DARKEST, BRIGHTEST = 0.3, 1.25  # shades of a paint
 BAND = 7  # pixels of a window that a paint's core has; blends along a border have less
-AREA = 21  # more are no blend, whatever labels say: three rows through the window
+AREA = 21  # pixels of a window: a blend along a border, three rows of it at most, has no more
 THREE = np.ones((3, 3), np.uint8)
 TWO = np.ones((2, 2), np.uint8)  # pixels: what is thinner the lossy picture of tints loses
 
@@ -146,7 +146,10 @@ def _cores(
     line: int | None,
     named: Sequence[Mask],
 ) -> dict[int, Mask]:
-    """Return the areas that surely are a paint, by its number: labels near, or width, name it."""
+    """Return the areas that surely are a paint, by its number.
+
+    Labels nearby name it, or the area is too wide for a blend.
+    """
     like = np.zeros(there.shape, np.uint8)
     least = np.where(there, np.float32(LIKE**2), np.float32(-1))
     sure = np.zeros_like(there)

@@ -132,7 +132,7 @@ def test_a_signal_that_trimesh_would_swallow_is_heard_after_it(number, folder):
         f"import signal\ntry: signal.raise_signal({int(number)})\nexcept BaseException: pass\n"
     )
     (folder / "trimesh.py").write_text(swallow)
-    verb = "def verb():\n import time, trimesh\n print('loaded', flush=True)\n time.sleep(60)\n"
+    verb = "def verb():\n import time, trimesh\n print('loaded', flush=True)\n time.sleep(10)\n"
     assert run_verb(verb, number, folder) == "loaded\n"
 
 
@@ -162,18 +162,18 @@ def test_a_key_pressed_while_modules_load_ends_without_a_word(folder):
     assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
 
 
-def test_a_signal_while_an_object_is_cleared_away_is_not_lost() -> None:
+def test_a_signal_in_a_finalizer_is_not_lost() -> None:
     script = (
         "import os, signal, time\n"
         "from toonset.cli.main import _end_by_signals\n"
         "_end_by_signals()\n"
-        "class Cleared:\n"
+        "class Final:\n"
         "    def __del__(self):\n"
         "        os.kill(os.getpid(), signal.SIGTERM)\n"
         "        time.sleep(0.01)\n"
-        "Cleared()\n"
-        "time.sleep(60)\n"
+        "Final()\n"
+        "time.sleep(10)\n"
     )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, timeout=50)
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, timeout=60)
     assert done.returncode == 143
     assert done.stderr == b""

@@ -18,7 +18,7 @@ from toonset.calib.without_body import rival
 from toonset.calib.without_body.find import calibrate_without_body
 from toonset.calib.without_body.placing import Figures, place
 from toonset.calib.without_body.posterior import label_doubt
-from toonset.calib.without_body.rival import ASK_ALONE, REFUSED, without_body_if_better
+from toonset.calib.without_body.rival import ASK_ALONE, REFUSED, with_body_or_without
 from toonset.calib.without_body.turns import is_even, turn_hypotheses, wrapped
 from toonset.calib.write_bundle import write_bundle
 from toonset.camera import Camera
@@ -209,10 +209,10 @@ def test_a_given_mannequin_in_doubt_yields_to_drawings_that_are_clearly_likelier
     alone = calibrate_without_body(views, Known())
     found = replace(alone, verdict="weak", reason="1 of 4 weak")
     monkeypatch.setattr(rival, "_odds", lambda *_: nats)
-    ask = partial(without_body_if_better, views, known=Known(), tell=lambda *_: None, alone=alone)
-    better, is_alone = ask(found, given=True)
-    assert is_alone == (nats > 3)
-    assert better.reason == (REFUSED if is_alone else f"{ASK_ALONE}; 1 of 4 weak")
+    ask = partial(with_body_or_without, views, known=Known(), tell=lambda *_: None, alone=alone)
+    better, has_no_body = ask(found, given=True)
+    assert has_no_body == (nats > 3)
+    assert better.reason == (REFUSED if has_no_body else f"{ASK_ALONE}; 1 of 4 weak")
     assert ask(found, given=False) == ((alone, True) if nats > 0 else (found, False))
     assert ask(alone, given=True) == (alone, False)  # certain: nothing is asked
 

@@ -98,5 +98,5 @@ def test_a_line_goes_on_where_no_drawing_shows_the_step() -> None:
     unseen[46:54, 36:46] = True
     torn = replace(unlined, inside=~unseen, labels=np.where(unseen, 2, unlined.labels))
     assert missing_steps(torn, depth, 1.0, PEN)[47:53].sum() == 0
-    cover = missing_steps(torn.gone_on(INSIDE), depth, 1.0, PEN)
+    cover = missing_steps(torn.extended(INSIDE), depth, 1.0, PEN)
     assert cover[10:90].sum(axis=1) == pytest.approx(PEN, abs=0.8)
