@@ -20,7 +20,14 @@ from toonset.palette.color_names import name_of
 from toonset.palette.colors import JUST_NOTICEABLE, shaded_oklab_from_rgb
 from toonset.palette.names import RGB, hex_of
 from toonset.palette.paints.features import ALIKE, LEAST_PX, PLACES, SMALL
-from toonset.palette.paints.ramps import Moments, join_patches, joined, moments_of
+from toonset.palette.paints.ramps import (
+    PRICE,
+    UNIT_PX,
+    Moments,
+    join_patches,
+    joined,
+    moments_of,
+)
 from toonset.palette.paints.select import KEEP_REACH, PaletteOptions
 from toonset.palette.palette import MAX_COLORS, DroppedColor, Palette, PaletteColor, Tone
 from toonset.palette.pixels.antialias import OPAQUE
@@ -34,7 +41,7 @@ from toonset.palette.pixels.patches import (
     shrunk,
     smooth_lab,
 )
-from toonset.palette.pixels.ramp_labels import Ramp, enlarged_labels, ramp_labels
+from toonset.palette.pixels.ramp_labels import Ramp, enlarged_labels, ramp_labels, savings
 from toonset.raster import dilate, erode
 
 SHADED = 1.05 / 255  # lightness per pixel at `TALL_PX`, the median: less is flat paint
@@ -82,11 +89,13 @@ class _Paint:
         color: with its ramp.
         places: in how many drawings it is at the height where it mostly is.
         pixels: there, in the shrunk drawings.
+        saves: see `savings`, of independent pixels.
     """
 
     color: PaletteColor
     places: int
     pixels: int
+    saves: float
 
 
 def is_shaded(pictures: Sequence[Picture]) -> bool:
@@ -129,10 +138,13 @@ def find_shaded_palette(pictures: Sequence[Picture], options: PaletteOptions) ->
     ramps += _asked_for(patches, ramps, options.keep)
     found = _paints(drawings, ramps[:MAX_COLORS])
     kept, left = _choose(found, options)
+    wanted = {_nearest(kept, rgb).color.rgb for rgb in options.keep}
     now = _paints(drawings, [ramp_of(one.color) for one in kept])
+    while idle := [i for i in range(len(kept)) if _is_idle(kept[i], now[i], wanted)]:
+        left.append(kept.pop(min(idle, key=lambda i: now[i].saves)))
+        now = _paints(drawings, [ramp_of(one.color) for one in kept])
     colors = [_with_share(*pair) for pair in zip(kept, now, strict=True)]
     colors.sort(key=lambda color: (-color.share, color.rgb))
-    wanted = {_nearest(kept, rgb).color.rgb for rgb in options.keep}
     small = tuple(c.rgb for c in colors if c.share < options.min_share and c.rgb not in wanted)
     palette = Palette(
         tuple(colors), _rule(options), tuple(_dropped(one, kept) for one in left), features=small
@@ -195,6 +207,11 @@ def _ramps(paints: Moments) -> list[Ramp]:
     ]
 
 
+def _is_idle(paint: _Paint, now: _Paint, wanted: set[RGB]) -> bool:
+    """Return whether a paint does not save its price beside the others: mixtures, a shadow."""
+    return now.saves < PRICE and paint.color.rgb not in wanted
+
+
 def _with_share(paint: _Paint, now: _Paint) -> PaletteColor:
     """Return a paint's colour and ramp with the share that it has beside those kept."""
     color, share = paint.color, now.color.share
@@ -230,6 +247,7 @@ def _paints(drawings: Sequence[_Drawing], ramps: Sequence[Ramp]) -> list[_Paint]
     chance = np.concatenate([own[d.opaque] for (_, own), d in zip(parts, drawings, strict=True)])
     light = np.concatenate([d.lab[d.opaque][:, 0] for d in drawings])
     rgb = np.concatenate([d.rgb[d.opaque] for d in drawings])
+    saved = sum(savings(d.lab, own, ramps) for (own, _), d in zip(parts, drawings, strict=True))
     found = []
     for number in range(len(ramps)):
         own = np.flatnonzero(label == number)
@@ -238,7 +256,7 @@ def _paints(drawings: Sequence[_Drawing], ramps: Sequence[Ramp]) -> list[_Paint]
         middle = tones[MIDDLE].rgb if tones else (0, 0, 0)
         share, sure = len(own) / len(label), float(chance[own].mean()) if len(own) else 0.0
         color = PaletteColor(middle, share, name_of(middle), tones, sure)
-        found.append(_Paint(color, places, pixels))
+        found.append(_Paint(color, places, pixels, float(saved[number]) / UNIT_PX))
     return found
 
 

@@ -22,7 +22,7 @@ from toonset.palette.pixels.labels import UNLABELLED
 from toonset.palette.pixels.patches import DARKEST, Lab, Numbers, Patches
 from toonset.raster import is_uniform
 
-HUE_SPREAD = 0.01  # in OKLab: of pixels off their ramp
+HUE_SPREAD = 0.007  # in OKLab: of pixels off their ramp
 LIGHT_SPREAD = 0.12  # lightness, at least, of a paint's pixels
 WIDE, LOYAL = 0.5, np.float32(2.0)  # lightness of a paint's patches; what a pixel's patch weighs
 MOST = 12.0  # that a pixel costs: it may be what no paint is
@@ -80,6 +80,25 @@ def ramp_labels(
     return labels, chance.max(axis=0)
 
 
+def savings(
+    lab: Lab, labels: UInt8[np.ndarray, "height width"], ramps: Sequence[Ramp]
+) -> Float[np.ndarray, " ramps"]:
+    """Return what every ramp saves beside the next best, in nats.
+
+    Counted are pixels with none but their own label around: where labels meet, colours are mixed.
+    Of a single ramp the savings are infinite.
+    """
+    if len(ramps) < 2:
+        return np.full(len(ramps), np.inf)
+    inner = is_uniform(labels) & (labels != UNLABELLED)
+    own, color = labels[inner], lab[inner]
+    squares = np.stack([_squares(color, ramp, _wide(ramp)) for ramp in ramps], axis=1)
+    row = np.arange(len(own))
+    spent = squares[row, own]
+    squares[row, own] = np.inf
+    return np.bincount(own, (squares.min(axis=1) - spent) / 2, len(ramps))
+
+
 def enlarged_labels(
     small: UInt8[np.ndarray, "small_height small_width"],
     picture: UInt8[np.ndarray, "height width 4"],
@@ -117,9 +136,14 @@ def _around(
 
 def _cost(lab: Float[np.ndarray, "*n 3"], ramp: Ramp) -> Float32[np.ndarray, "*n"]:
     """Return what colours cost as a paint."""
-    spread = float(np.hypot(ramp.spread, LIGHT_SPREAD))
+    spread = _wide(ramp)
     rare = np.log(spread / LIGHT_SPREAD)
     return np.minimum(_squares(lab, ramp, spread) / 2 + rare, MOST).astype(np.float32)
+
+
+def _wide(ramp: Ramp) -> float:
+    """Return the deviation of lightness that pixels of a ramp are given."""
+    return float(np.hypot(ramp.spread, LIGHT_SPREAD))
 
 
 def _squares(lab: Float[np.ndarray, "*n 3"], ramp: Ramp, spread: float) -> Float[np.ndarray, "*n"]:
