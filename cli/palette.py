@@ -107,14 +107,6 @@ def palette(
             show_default=False,
         ),
     ] = None,
-    method: Annotated[
-        Literal["toonset", "extcolors"],
-        typer.Option(
-            "--method",
-            help="Ours, or the paper's tool for comparison.",
-            rich_help_panel=CHOICE_PANEL,
-        ),
-    ] = "toonset",
     space: Annotated[
         Literal["rgb", "oklab"],
         typer.Option("--space", help="In which labels are the nearest colour."),
@@ -170,14 +162,7 @@ def palette(
         printer.say(note)
     contours = find_contours(drawn.pictures)
     found, maps, notes = label_drawings(
-        drawn,
-        contours,
-        options,
-        given,
-        colors=colors,
-        swatches=swatches,
-        method=method,
-        space=space,
+        drawn, contours, options, given, colors=colors, swatches=swatches, space=space
     )
     for note in notes:
         printer.say(note)

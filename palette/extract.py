@@ -17,7 +17,6 @@ from toonset.palette.formats.registry import (
     parse_named_colors,
 )
 from toonset.palette.named import with_names
-from toonset.palette.paints.extcolors import extcolors_palette
 from toonset.palette.paints.extract import PICKED, find_palette, pick_palette
 from toonset.palette.paints.features import find_features
 from toonset.palette.paints.grainy_colors import read_drawn_colors
@@ -47,7 +46,6 @@ Map = UInt8[np.ndarray, "height width"]
 Mask = Bool[np.ndarray, "height width"]
 
 LINE = 128  # of 255: covered by half, a pixel is a drawn line's
-METHODS = ("toonset", "extcolors")
 NEVER_IN_LIGHT = 0.95  # of a paint's pixels lie in shadow
 IN_LIGHT, IN_SHADOW = 0, 1  # tones; UNLABELLED where there is no paint
 
@@ -75,7 +73,6 @@ def extract_palette(
     contour: bool = True,
     features: bool | None = None,
     colors: str | None = None,
-    method: str = "toonset",
     swatches: bool | None = None,
 ) -> Palette:
     """Return the colours that make up at least 5 % of a character, the most frequent first.
@@ -90,7 +87,6 @@ def extract_palette(
         colors: a palette of your own instead: "#aabbcc,#123,white", or a palette file, whose title
             and names are kept. Where the file has tones in shadow, a sheet's shadow is taken off;
             else name both tones.
-        method: "toonset", or "extcolors", the paper's tool.
         swatches: take the palette that the views' sheets print as the whole palette, as it is;
             None: keep its colours that the drawings are painted in, and add what else there is;
             False: do not look at it.
@@ -104,7 +100,7 @@ def extract_palette(
     options = options_of(min_share, max_colors, keep, contour=contour, features=features)
     own = [rgb for view in views if isinstance(view, View) for rgb in view.swatches]
     printed = Printed(tuple(dict.fromkeys(own)), swatches)
-    return choose_palette(pictures, contours, options, colors, method, printed)
+    return choose_palette(pictures, contours, options, colors, printed)
 
 
 def label_image(view: View | Picture, palette: Palette, *, space: Space = "rgb") -> Map:
@@ -166,7 +162,6 @@ def choose_palette(
     contours: Sequence[Map],
     options: PaletteOptions | None = None,
     colors: str | None = None,
-    method: str = "toonset",
     printed: Printed | None = None,
 ) -> Palette:
     """Return the palette of pictures whose drawn lines are known; see `extract_palette`.
@@ -176,12 +171,9 @@ def choose_palette(
         contours: how far drawn lines cover their pixels, of 255.
         options: of the choice.
         colors: a palette of the user's own.
-        method: "toonset", or "extcolors".
         printed: the palette that the sheets print, and whether it is to be used.
     """
     printed = printed or Printed()
-    if printed.use is not None and method != "toonset":
-        raise UsageError("--swatches belongs to --method toonset")
     if printed.use and colors is None:
         colors = printed.as_colors()
     solid = [opaque_inside(picture) for picture in pictures]
@@ -192,7 +184,7 @@ def choose_palette(
     if grids is not None:
         read = [grid.reduced(picture) for grid, picture in zip(grids, solid, strict=True)]
         lines = [grid.reduced(contour) for grid, contour in zip(grids, contours, strict=True)]
-    found = _chosen(read, lines, options or PaletteOptions(), colors, method, printed)
+    found = _chosen(read, lines, options or PaletteOptions(), colors, printed)
     notes = (*see_through_notes(pictures), *gain_notes(gains))
     if grids is not None:
         notes += (
@@ -223,19 +215,12 @@ def _chosen(
     contours: Sequence[Map],
     options: PaletteOptions,
     colors: str | None,
-    method: str,
     printed: Printed,
 ) -> Palette:
-    if method not in METHODS:
-        raise UsageError(f"--method: {method!r} is none of {', '.join(METHODS)}")
-    if colors is not None and (options.keep or method != "toonset"):
-        raise UsageError("--colors is the whole palette; leave --keep and --method away")
-    if options.keep and method != "toonset":
-        raise UsageError("--keep belongs to --method toonset")
+    if colors is not None and options.keep:
+        raise UsageError("--colors is the whole palette; leave --keep away")
     lines = [contour >= LINE for contour in contours]
     picked = None if colors is None else _typed("--colors", colors)
-    if method == "extcolors":
-        return add_places(extcolors_palette(pictures, options), pictures)
     smooth = remove_grain(pictures)
     if is_shaded(pictures):
         if picked is not None:

@@ -20,14 +20,7 @@ from toonset.palette.color_names import name_of
 from toonset.palette.colors import JUST_NOTICEABLE, shaded_oklab_from_rgb
 from toonset.palette.names import RGB, hex_of
 from toonset.palette.paints.features import ALIKE, LEAST_PX, PLACES, SMALL
-from toonset.palette.paints.ramps import (
-    PRICE,
-    UNIT_PX,
-    Moments,
-    join_patches,
-    joined,
-    moments_of,
-)
+from toonset.palette.paints.ramps import PRICE, UNIT_PX, Moments, join_patches, joined, moments_of
 from toonset.palette.paints.select import KEEP_REACH, PaletteOptions
 from toonset.palette.palette import MAX_COLORS, DroppedColor, Palette, PaletteColor, Tone
 from toonset.palette.pixels.antialias import OPAQUE
@@ -208,7 +201,7 @@ def _ramps(paints: Moments) -> list[Ramp]:
 
 
 def _is_idle(paint: _Paint, now: _Paint, wanted: set[RGB]) -> bool:
-    """Return whether a paint does not save its price beside the others: mixtures, a shadow."""
+    """Return whether a paint is hardly needed beside the others: mixtures, a shadow of several."""
     return now.saves < PRICE and paint.color.rgb not in wanted
 
 
@@ -247,7 +240,9 @@ def _paints(drawings: Sequence[_Drawing], ramps: Sequence[Ramp]) -> list[_Paint]
     chance = np.concatenate([own[d.opaque] for (_, own), d in zip(parts, drawings, strict=True)])
     light = np.concatenate([d.lab[d.opaque][:, 0] for d in drawings])
     rgb = np.concatenate([d.rgb[d.opaque] for d in drawings])
-    saved = sum(savings(d.lab, own, ramps) for (own, _), d in zip(parts, drawings, strict=True))
+    saved = np.sum(
+        [savings(d.lab, own, ramps) for (own, _), d in zip(parts, drawings, strict=True)], axis=0
+    )
     found = []
     for number in range(len(ramps)):
         own = np.flatnonzero(label == number)

@@ -81,7 +81,11 @@ def palette_cases(folder: Path | None, seed: int, *, quick: bool) -> Iterator[Pa
             clean = tuple(view.rgba for view in drawn.views)
             yield PaletteCase(mesh.name, f"{group}, png", clean, colors, shares)
             yield PaletteCase(
-                mesh.name, f"{group}, jpeg {JPEG_QUALITY}", _as_jpeg(drawn), colors, shares
+                mesh.name,
+                f"{group}, jpeg {JPEG_QUALITY}",
+                as_jpeg(drawn, JPEG_QUALITY),
+                colors,
+                shares,
             )
 
 
@@ -149,9 +153,9 @@ def _truth(drawn: Turnaround) -> tuple[UInt8[np.ndarray, "colors 3"], Float[np.n
     return np.concatenate([colors, np.array([INK], dtype=np.uint8)]), areas / areas.sum()
 
 
-def _as_jpeg(drawn: Turnaround) -> Images:
+def as_jpeg(drawn: Turnaround, quality: int) -> Images:
     """Return the views cut from the sheet's JPEG, along the true silhouettes."""
-    sheet = through_jpeg(drawn.sheet, JPEG_QUALITY)[..., :3]
+    sheet = through_jpeg(drawn.sheet, quality)[..., :3]
     images = []
     for view in drawn.views:
         x, y, width, height = view.box

@@ -2,7 +2,8 @@
 
 A colour is found if it lies within 0.02 in OKLab of a true one; two found colours cannot claim the
 same. Missing is a true colour of 5 % or more that nobody claims; spurious is a found colour that
-claims none. A true colour of less than 5 % may be found or not.
+claims none. A true colour of less than 5 % may be found or not. Painted sheets, whose paints have
+no one colour, have figures of their own: see `bench.palette.painted`.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ from jaxtyping import UInt8
 
 from bench.palette.cases import PaletteCase, palette_cases
 from bench.palette.methods import LEAST_SHARE, METHODS, RGB
+from bench.palette.painted import COLUMNS as PAINTED
+from bench.palette.painted import bench_painted
 from bench.records.record import CPU_SECONDS, Column, Record, Recorder, methods_table
 from toonset.palette.colors import JUST_NOTICEABLE, oklab_from_rgb
 
@@ -81,7 +84,8 @@ def bench_palette(
     records += _pooled(scores, seed)
     for (size, name), times in seconds.items():
         records.append(Recorder(name, size, seed).samples(CPU_SECONDS, times, "s"))
-    return records, methods_table(records, COLUMNS)
+    records += bench_painted(cases, seed, quick=quick, progress=progress)
+    return records, methods_table(records, (*COLUMNS[:-1], *PAINTED, COLUMNS[-1]))
 
 
 def score(found: Sequence[RGB], case: PaletteCase) -> Score:

@@ -17,6 +17,7 @@ from bench.cases.bodies import HAIR, SKIN, random_body
 from bench.palette.cases import INK, PaletteCase
 from bench.palette.measure import f1, score
 from bench.palette.methods import LEAST_SHARE, LINE
+from bench.palette.painted import painted_case, score_painted
 from bench.stability.bodies import recolored, with_eyes
 from bench.stability.sheets import DrawnSheet, as_cut_out
 from bench.stability.trials import Drawer, Kind, Trial, Tried
@@ -108,6 +109,20 @@ def try_labels(draw: Drawer, seed: int, *, paints: bool = False) -> Tried:
     return (Trial(seed, value, WARNED if palette.warnings else SILENT, words),), picture
 
 
+def try_painted(draw: Drawer, seed: int) -> Tried:
+    """Return what the index of a painted sheet's labels lacks of 1, in percent."""
+    case = painted_case(draw())
+    palette = extract_palette(case.images)
+    maps = paint_maps(case.images, find_contours(case.images), palette)
+    labels = [one.labels for one in maps]
+    result = score_painted(case, [color.rgb for color in palette.colors], labels)
+    words = "; ".join([f"{len(palette.colors)} colours", *palette.warnings])
+    colors = np.concatenate([palette.rgb, np.full((256 - len(palette.rgb), 3), 255, np.uint8)])
+    picture = encode_png(np.hstack([_shown(case.images[0]), colors[labels[0]]]))
+    voice = WARNED if palette.warnings else SILENT
+    return (Trial(seed, 100 * (1 - result.index), voice, words),), picture
+
+
 def _has(palette: UInt8[np.ndarray, "colors 3"], color: Rgb, wanted: Sequence[Rgb]) -> bool:
     """Return whether a palette's colour is this one, and none of the others."""
     others = [other for other in wanted if other != color]
@@ -189,4 +204,10 @@ PAINTS = Kind(
     rule="The palette of a fine sheet has an F1 of 0.9 or more, one below 0.75 has failed; it is "
     "announced by a warning of the palette's.",
     pictures=LABELS.pictures,
+)
+PAINTED = Kind(
+    *("painted", "sheets", "index short of 1", "%", 10.0, 10.0, 100.0, (SILENT,), try_painted),
+    rule="A painted sheet has failed whose labels agree with its paints to an adjusted Rand index "
+    "below 0.9; it is announced by a warning of the palette's.",
+    pictures="the first drawing of a step's worst sheet, and its labels in their paints' colours.",
 )

@@ -13,7 +13,7 @@ from typing import Any
 from bench.stability import scenes, sheets
 from bench.stability.bodies import with_arms_raised, with_head_grown
 from bench.stability.cameras import CALIBRATION
-from bench.stability.colors import LABELS, PAINTS, PALETTE, near_equal, tiny_feature
+from bench.stability.colors import LABELS, PAINTED, PAINTS, PALETTE, near_equal, tiny_feature
 from bench.stability.damage import stretched, with_gaps_closed, without_feet
 from bench.stability.fields import LOOK, TRAINING, look_case, look_of_turned
 from bench.stability.scenes import changed, draw_scene, misscaled, misturned, with_usual_views
@@ -26,6 +26,7 @@ from bench.stability.sheets import (
     as_cut_out,
     draw_sheet,
     each,
+    painters,
 )
 from bench.stability.trials import Kind, Page
 
@@ -137,6 +138,19 @@ PAGES = (
         PAINTS,
         [("paints colours", "colours off by up to, % per view", (0, 3, 6, 10, 15, 20), None)],
         {"paints colours": lambda s, seed: artists(seed, color_error_fraction=s / 100)},
+    ),
+    *_pages(
+        PAINTED,
+        [
+            ("painted light", "light lost on the side away from it, %", (0, 30, 60, 75, 90), None),
+            ("painted strokes", "brush's unevenness, % of the light", (0, 5, 10, 20, 30), None),
+            ("painted near", "hair to skin, OKLab x 100", (20, 10, 6, 4, 3, 2, 1), None),
+        ],
+        {
+            "painted near": lambda s, seed: painters(seed, near_equal(s / 100, seed)[0]),
+            "painted light": lambda s, seed: painters(seed, soft_light=s / 100),
+            "painted strokes": lambda s, seed: painters(seed, strokes=s / 100),
+        },
     ),
     *_pages(
         TRAINING,

@@ -30,6 +30,7 @@ from toonset.mesh import Mesh
 BASE = SynthOptions(views=5, cell_px=200, yaw_jitter_deg=8, elevation_deg=10, outline_px=2)
 ARTIST = replace(CONDITIONS["artist"], cell_px=200, outline_px=2)
 STUDIO = replace(CONDITIONS["studio"], cell_px=200, outline_px=2)
+PAINTED = replace(CONDITIONS["painted"], cell_px=200)
 LOSSLESS, HARD, OTHER = "lossless", "hard", "other body"
 
 Step = float | str
@@ -152,6 +153,12 @@ def artists(seed: int, **habits: Any) -> Turnaround:
     """Return an artist's sheet of the seed's body with changed habits."""
     options = replace(ARTIST, artist=replace(ARTIST.artist, **habits))
     return make_turnaround(random_body(seed), options, seed)
+
+
+def painters(seed: int, body: Mesh | None = None, **brush: float) -> Turnaround:
+    """Return a painter's sheet of a body (the seed's) with a changed brush."""
+    artist = replace(PAINTED.artist, brush=replace(PAINTED.artist.brush, **brush))
+    return make_turnaround(body or random_body(seed), replace(PAINTED, artist=artist), seed)
 
 
 def of_studio(seed: int, views: int = 4, pose: float = 1.0) -> DrawnSheet:

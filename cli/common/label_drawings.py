@@ -24,7 +24,6 @@ def label_drawings(
     *,
     colors: str | None = None,
     swatches: bool | None = None,
-    method: str = "toonset",
     space: Space = "rgb",
 ) -> tuple[Palette, list[PaintMap] | None, tuple[str, ...]]:
     """Return the palette, its maps where a person corrected them, and notes for people.
@@ -36,7 +35,6 @@ def label_drawings(
         given: what a person corrected.
         colors: a palette of the user's own: see `extract_palette`.
         swatches: see `extract_palette`.
-        method: see `extract_palette`.
         space: in which the nearest colour is meant.
 
     Raises:
@@ -45,7 +43,7 @@ def label_drawings(
     wanted = PaletteCorrections() if given is None else given.content.palette
     try:
         printed = Printed(drawn.swatches, swatches)
-        found = choose_palette(drawn.pictures, contours, options, colors, method, printed)
+        found = choose_palette(drawn.pictures, contours, options, colors, printed)
     except ToonsetError as error:
         if given is None or not wanted.keep:
             raise

@@ -1,8 +1,8 @@
-"""Read what is written under or over figures: FRONT, 3/4, Seite, dos, perfil, 背面.
+"""Read what is written: FRONT, 3/4, Seite, 背面 under or over figures, #d95430 beside swatches.
 
 The reader is RapidOCR with the PP-OCRv6 weights of its wheel (extra `captions`): Latin letters,
 Han and kana, but no Hangul. Without it sheets have no captions. A caption is evidence and never
-law (`toonset.calib.captions`).
+law (`toonset.calib.captions`); a code counts where its swatch is painted in it.
 """
 
 from __future__ import annotations
@@ -21,7 +21,9 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.dataset.split.figures.rows import Taken
-from toonset.dataset.split.sheet import FigureGroup, Segmentation
+from toonset.dataset.split.sheet import FigureGroup, Segmentation, Swatch
+from toonset.palette.colors import JUST_NOTICEABLE, oklab_from_rgb
+from toonset.palette.names import hex_of, rgb_of_hex
 from toonset.view import Box
 
 LONGEST_PX = 2000  # of a sheet as it is read
@@ -30,6 +32,10 @@ BAND = 0.25  # of a figure's height: a text farther below or above it is a title
 ASIDE = 0.1  # of a figure's height: its caption's middle is no farther beside it
 LEAST_SAID = 2  # captions that make a row of figures a turnaround
 LEAST_FUZZY = 6  # letters: "light" is no "right"
+BESIDE = 1.0  # of a swatch's height: its code is no farther from it
+PRINTED = 2 * JUST_NOTICEABLE  # in OKLab: a code and its swatch, a JPEG's even, differ by less
+CODE = re.compile(r"(#?)([0-9a-fA-F]{6})")
+DIGITS = str.maketrans("OoIlSs", "001155")  # #D9S43O
 SETTINGS = {  # one thread: the same texts on any number of cores
     "Global.log_level": "critical",
     "Global.use_cls": False,  # nothing stands on its head
@@ -99,7 +105,9 @@ def with_captions(
     found: Segmentation,
     cut: Callable[[Taken], Segmentation] | None = None,
 ) -> Segmentation:
-    """Return the drawings with their captions; as they are where no reader is installed.
+    """Return the drawings with their captions, and swatches in the colours that codes say.
+
+    All stays as it is where no reader is installed.
 
     Args:
         rgba: the sheet.
@@ -110,9 +118,19 @@ def with_captions(
     read = _reader()
     boxes = [view.figure_box for view in found.views]
     drawn = [box for group in found.groups for row in group.rows for box in row]
-    if read is None or not _may_have_captions(found, [*boxes, *drawn]):
+    captioned = _may_have_captions(found, [*boxes, *drawn])
+    if read is None or not (captioned or found.swatches):
         return found
     texts = read(rgba)
+    if captioned:
+        found = _captioned(texts, found, cut)
+    return _coded(texts, found)
+
+
+def _captioned(
+    texts: Sequence[Text], found: Segmentation, cut: Callable[[Taken], Segmentation] | None
+) -> Segmentation:
+    boxes = [view.figure_box for view in found.views]
     labels = caption_labels(texts, boxes)
     named = None if cut is None or any(labels) else _captioned_group(texts, found.groups)
     if cut is not None and named is not None:
@@ -133,6 +151,37 @@ def with_captions(
         views=tuple(replace(view, caption=label) for view, label in views),
         remarks=(*found.remarks, f"captions were read: {listed}; --views says otherwise"),
     )
+
+
+def _coded(texts: Sequence[Text], found: Segmentation) -> Segmentation:
+    """Return the drawings whose swatches have the colours that are written beside them."""
+    codes = [(t, CODE.fullmatch(t.words.strip().translate(DIGITS))) for t in texts]
+    if not found.swatches or not any(code for _, code in codes):
+        return found
+    swatches, remarks = list(found.swatches), list(found.remarks)
+    for text, code in codes:
+        near = [_apart(text.box, one.box) / one.box[3] for one in swatches]
+        if code is None or min(near) > BESIDE:
+            continue
+        number = int(np.argmin(near))
+        swatch, said = swatches[number], rgb_of_hex(f"#{code[2].lower()}", "code")
+        colors = oklab_from_rgb(np.array([said, swatch.color], dtype=np.uint8))
+        if np.linalg.norm(colors[0] - colors[1]) <= PRINTED:
+            swatches[number] = Swatch(swatch.box, said)
+        elif code[1]:
+            remarks.append(
+                f"the sheet says {hex_of(said)} beside a swatch of {hex_of(swatch.color)}: the "
+                "swatch counts"
+            )
+    return replace(found, swatches=tuple(swatches), remarks=tuple(remarks))
+
+
+def _apart(one: Sequence[float], other: Sequence[float]) -> float:
+    """Return how far two boxes are apart; 0 where they overlap."""
+    x, y = (
+        max(one[i] - other[i] - other[i + 2], other[i] - one[i] - one[i + 2], 0) for i in (0, 1)
+    )
+    return float(np.hypot(x, y))
 
 
 def caption_labels(texts: Sequence[Text], boxes: Sequence[Box]) -> tuple[str, ...]:

@@ -83,20 +83,18 @@ def ramp_labels(
 def savings(
     lab: Lab, labels: UInt8[np.ndarray, "height width"], ramps: Sequence[Ramp]
 ) -> Float[np.ndarray, " ramps"]:
-    """Return what every ramp saves beside the next best, in nats.
+    """Return what the pixels of every ramp would cost more, in nats, if it were not there.
 
-    Counted are pixels with none but their own label around: where labels meet, colours are mixed.
-    Of a single ramp the savings are infinite.
+    Of a single ramp that is infinite.
     """
     if len(ramps) < 2:
         return np.full(len(ramps), np.inf)
-    inner = is_uniform(labels) & (labels != UNLABELLED)
-    own, color = labels[inner], lab[inner]
-    squares = np.stack([_squares(color, ramp, _wide(ramp)) for ramp in ramps], axis=1)
+    there = labels != UNLABELLED
+    own, cost = labels[there], np.stack([_cost(lab[there], ramp) for ramp in ramps], axis=1)
     row = np.arange(len(own))
-    spent = squares[row, own]
-    squares[row, own] = np.inf
-    return np.bincount(own, (squares.min(axis=1) - spent) / 2, len(ramps))
+    spent = cost[row, own]
+    cost[row, own] = np.inf
+    return np.bincount(own, cost.min(axis=1) - spent, len(ramps))
 
 
 def enlarged_labels(
@@ -136,14 +134,9 @@ def _around(
 
 def _cost(lab: Float[np.ndarray, "*n 3"], ramp: Ramp) -> Float32[np.ndarray, "*n"]:
     """Return what colours cost as a paint."""
-    spread = _wide(ramp)
+    spread = float(np.hypot(ramp.spread, LIGHT_SPREAD))
     rare = np.log(spread / LIGHT_SPREAD)
     return np.minimum(_squares(lab, ramp, spread) / 2 + rare, MOST).astype(np.float32)
-
-
-def _wide(ramp: Ramp) -> float:
-    """Return the deviation of lightness that pixels of a ramp are given."""
-    return float(np.hypot(ramp.spread, LIGHT_SPREAD))
 
 
 def _squares(lab: Float[np.ndarray, "*n 3"], ramp: Ramp, spread: float) -> Float[np.ndarray, "*n"]:

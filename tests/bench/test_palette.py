@@ -8,6 +8,7 @@ import pytest
 from bench.palette.cases import LEAST_APART, PaletteCase, palette_cases, random_paints
 from bench.palette.measure import bench_palette, f1, score
 from bench.palette.methods import METHODS
+from bench.palette.painted import PaintedCase, score_painted
 from toonset.errors import BundleError
 from toonset.palette.colors import oklab_from_rgb
 
@@ -58,4 +59,19 @@ def test_the_bench_runs_and_ours_is_best() -> None:
         for name in METHODS
     }
     assert merit["default"] == max(merit.values())
+    painted = {r.method: r.value for r in records if r.metric == "index of labels"}
+    assert painted["default"] > 0.9 > painted["k-means, true k"]
     assert "1200 x 600" in text
+
+
+def test_labels_of_painted_sheets_are_scored() -> None:
+    image = np.full((10, 20, 4), 255, dtype=np.uint8)
+    image[:, :10, :3], image[:, 10:, :3] = COLORS[:2]
+    truth = np.repeat([[0, 1]], 10, axis=0).repeat(10, axis=1).astype(np.uint8)
+    truth[0] = 255
+    painted = PaintedCase("two", [image], [truth], np.array([0.5, 0.5]))
+    red, blue, _ = ((int(r), int(g), int(b)) for r, g, b in COLORS)
+    right = score_painted(painted, [red, blue], [1 - truth])
+    assert (right.index, right.balanced, right.found) == (1, 1, 1)
+    one = score_painted(painted, [red], [np.zeros_like(truth)])
+    assert (one.index, one.balanced, one.found) == (0, 0.5, 0.5)

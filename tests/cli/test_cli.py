@@ -104,7 +104,7 @@ def test_help_is_also_a_word(asked, shown, toonset):
         (["train", "--preset", "papre"], ["mean 'paper'?"]),
         (["train", "--field", "triplan"], ["mean 'triplane'?"]),
         (["export", "b", "-o", "x", "--to", "colmap", "--layout", "odl"], ["mean 'old'?"]),
-        (["palette", "--method", "extcolor"], ["mean 'extcolors'?"]),
+        (["palette", "--space", "oklba"], ["mean 'oklab'?"]),
         (["calibrate", "a.png", "--lock", "elevatoin"], ["mean 'elevation'?"]),
     ],
 )

@@ -13,7 +13,7 @@ from toonset.cli.split import split
 from toonset.dataset.bundle.read_scene import read_scene
 from toonset.dataset.bundle.transforms import transforms_dict
 from toonset.dataset.images.picture import encode_png, load_indexed_png, load_rgba
-from toonset.errors import OutputError, ToonsetError, UsageError
+from toonset.errors import OutputError, ToonsetError
 from toonset.palette.palette import Evidence, Palette, PaletteColor
 from toonset.write import write_bytes, write_json
 
@@ -267,16 +267,6 @@ def test_a_palette_is_called_as_its_sheet_or_folder(tmp_path: Path, toonset) -> 
     assert made.code in (0, 3)  # one view is never sure
     palette([tmp_path / "b"])
     assert "Name: girl\n" in (tmp_path / "b" / "palette.gpl").read_text()
-
-
-def test_the_papers_tool_can_be_asked(tmp_path: Path) -> None:
-    write_bytes(tmp_path / "a.png", encode_png(figure()))
-    palette([tmp_path / "a.png"], method="extcolors", out=tmp_path / "out")
-    content = json.loads((tmp_path / "out" / "palette.json").read_text())
-    assert content["rule"].startswith("extcolors, tolerance 32")
-    assert [color["hex"] for color in content["colors"]] == ["#c81e28", "#143cb4"]
-    with pytest.raises(UsageError, match="--keep belongs to --method toonset"):
-        palette([tmp_path / "a.png"], method="extcolors", keep="#fff", out=tmp_path / "o")
 
 
 def test_drawings_are_written_in_other_colours(tmp_path: Path) -> None:

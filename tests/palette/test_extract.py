@@ -1,6 +1,5 @@
 """Palettes: exact on flat drawings, blind to order, orientation, blends, noise and shades."""
 
-import importlib
 import io
 
 import cv2
@@ -9,9 +8,7 @@ import pytest
 from PIL import Image
 
 from tests.palette.pictures import as_set, block, opaque, ramp, soft_stripes
-from toonset.errors import PaletteError
 from toonset.palette.colors import oklab_from_rgb
-from toonset.palette.paints.extcolors import extcolors_palette
 from toonset.palette.paints.extract import find_palette
 from toonset.palette.paints.histogram import count_pixels
 
@@ -144,15 +141,3 @@ def test_thin_soft_lines_give_their_pure_ink() -> None:
     for x in range(6, 78, 6):  # 1.5 px wide: a core, and half of it beside
         rgb[:, x], rgb[:, x + 1] = (10, 10, 10), (120, 95, 35)
     assert as_set(find_palette([opaque(rgb)])) == {(230, 180, 60), (10, 10, 10)}
-
-
-def test_extcolors_is_the_library() -> None:
-    palette = extcolors_palette([RGBA])
-    extcolors = importlib.import_module("extcolors")  # untyped
-    pixels = RGBA[RGBA[..., 3] > 0]
-    found, total = extcolors.extract_from_image(Image.fromarray(pixels[None]))
-    assert [(color.rgb, color.share) for color in palette.colors] == [
-        (rgb, count / total) for rgb, count in found if count >= 0.05 * total
-    ]
-    with pytest.raises(PaletteError, match="no pixel to count"):
-        extcolors_palette([np.zeros((4, 4, 4), np.uint8)])

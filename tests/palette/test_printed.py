@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.palette.pictures import block
-from toonset.errors import PaletteError, UsageError
+from toonset.errors import PaletteError
 from toonset.palette.corrected import correct_palette
 from toonset.palette.corrections import PaletteCorrections
 from toonset.palette.extract import choose_palette, extract_palette
@@ -28,11 +28,9 @@ RED, BLUE, EYE, SKIN, ODD = (
 FIGURE = block((RED, 200), (BLUE, 100), (EYE, 6), (SKIN, 40))
 
 
-def choose(
-    picture: np.ndarray, printed: Printed, colors: str | None = None, method: str = "toonset"
-) -> Palette:
+def choose(picture: np.ndarray, printed: Printed, colors: str | None = None) -> Palette:
     contours = find_contours([picture])
-    return choose_palette([picture], contours, colors=colors, method=method, printed=printed)
+    return choose_palette([picture], contours, colors=colors, printed=printed)
 
 
 def colors(found: Palette) -> list[Rgb]:
@@ -70,8 +68,6 @@ def test_switched_off_nothing_changes_and_switched_on_it_is_the_palette() -> Non
     assert "no pixel is nearest to" not in str(found.warnings)
     with pytest.raises(PaletteError, match="--swatches: no printed palette was found"):
         choose(FIGURE, Printed(use=True))
-    with pytest.raises(UsageError, match="--swatches belongs to --method toonset"):
-        choose(FIGURE, Printed(printed, use=True), method="extcolors")
 
 
 def test_where_paints_run_together_the_printed_ones_are_the_paints() -> None:

@@ -12,8 +12,9 @@ from toonset.palette.paints.ramps import join_patches, moments_of
 from toonset.palette.paints.select import PaletteOptions
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.patches import Patches, find_patches, smooth_lab
+from toonset.palette.pixels.ramp_labels import Ramp, savings
 from toonset.palette.recolor import recolor_drawing
-from toonset.palette.shaded import is_shaded
+from toonset.palette.shaded import find_shaded_palette, is_shaded
 from toonset.raster import erode
 
 SKIN, HAIR, COAT, BELT = (230, 180, 145), (110, 64, 42), (50, 96, 160), (190, 40, 44)
@@ -197,3 +198,32 @@ def test_two_paints_that_nobody_can_tell_apart_are_one(
     colors: list[tuple[float, float, float]], paints: int
 ) -> None:
     assert len(np.unique(join_patches(moments_of([_patches(colors)])))) == paints
+
+
+@pytest.mark.parametrize("width", [1, 2])
+def test_thin_stripes_are_one_paint_in_whatever_light(width: int) -> None:
+    rng = np.random.default_rng(0)
+    stripe = (np.array(COAT) + BELT) / 2
+    pictures = []
+    for seed in range(3):
+        rgba, _ = _drawing(seed)
+        for row in (90, 100, 110, 145, 155, 165, 175, 185):
+            rgba[row : row + width, 14:76, :3] = np.clip(stripe * rng.uniform(0.3, 1.2), 0, 255)
+        pictures.append(rgba)
+    found = find_shaded_palette(pictures, PaletteOptions(min_share=0.001))
+    assert len(found.colors) == len(PAINTS) + 1
+    away = oklab_from_rgb(found.rgb) - oklab_from_rgb(stripe.astype(np.uint8))
+    assert np.linalg.norm(away[:, 1:], axis=1).min() < 0.03
+
+
+def test_what_a_ramp_saves_is_what_its_pixels_cost_as_another() -> None:
+    stops = oklab_from_rgb(np.array([SKIN, COAT, COAT], np.uint8))
+    ramps = [Ramp(stop[None], float(stop[0]), 0.1) for stop in stops]
+    lab = np.repeat(stops[:2], 50, axis=0).reshape(10, 10, 3).astype(np.float32)
+    labels = np.repeat(np.array([0, 1], np.uint8), 50).reshape(10, 10)
+    labels[0] = 255
+    skin, coat, twin = savings(lab, labels, ramps)
+    assert skin > 300
+    assert coat == pytest.approx(0)
+    assert twin == 0
+    assert np.isinf(savings(lab, np.zeros_like(labels), ramps[:1])).all()

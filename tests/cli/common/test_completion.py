@@ -75,7 +75,6 @@ def test_options_are_completed(completed: Callable[[str], set[str]]) -> None:
         ("train --field tri", {"triplane"}),
         ("train --preset ", {"fast", "paper"}),
         ("train --device c", {"cpu", "cuda"}),
-        ("palette --method e", {"extcolors"}),
         ("palette --space ", {"rgb", "oklab"}),
         ("calibrate sheet.png --lock e", {"elevation"}),
         ("import folder --up ", {"y", "z"}),

@@ -83,6 +83,7 @@ class StandIn:
 
     said = ("FRONT", "SIDE", "BACK")
     sure = 0.99
+    top = 268
     pages = 0
 
     def __init__(self, params):
@@ -95,7 +96,8 @@ class StandIn:
         if not self.said:
             return None
         by = bgr.shape[1] / 420
-        corners = np.array([[-30, 268], [30, 268], [30, 288], [-30, 288]], float)
+        top = self.top
+        corners = np.array([[-30, top], [30, top], [30, top + 20], [-30, top + 20]], float)
         boxes = np.stack([corners + np.array([x, 0]) for x in (70, 200, 330)]) * by
         return SimpleNamespace(boxes=boxes, txts=self.said, scores=(self.sure,) * 3)
 
@@ -217,3 +219,38 @@ def test_what_a_person_takes_stays(reader, tmp_path):
 def test_one_caption_takes_no_group(reader, monkeypatch, tmp_path):
     monkeypatch.setattr(reader, "said", ("FRONT", "Bob", "Ann"))
     assert [view.figure_box[3] for view in split_sheet(two_rows(tmp_path)).views] == [137] * 3
+
+
+SWATCHES = ((217, 84, 48), (38, 138, 140), (46, 58, 104))
+
+
+def sheet_with_swatches():
+    """Return a sheet with three figures and a square of paint under each; a word under those."""
+    rgba = np.pad(sheet_of_three()[:265], ((0, 120), (0, 0), (0, 0)), constant_values=255)
+    for x, color in zip((70, 200, 330), SWATCHES, strict=True):
+        rgba[290:330, x - 42 : x + 42, :3] = color
+    return rgba
+
+
+@pytest.mark.parametrize(
+    ("said", "colors", "remarks"),
+    [
+        (("#D85530", "#268A8C", "#2e3a68"), ((216, 85, 48), *SWATCHES[1:]), []),
+        (("D85530", "skin", "#2E3A6B"), ((216, 85, 48), SWATCHES[1], (46, 58, 107)), []),
+        (("#D8S53O", "facade", "decade"), ((216, 85, 48), *SWATCHES[1:]), []),
+        (
+            ("#268A8C", "#268A8C", "#2e3a68"),
+            SWATCHES,
+            ["the sheet says #268a8c beside a swatch of #d95430: the swatch counts"],
+        ),
+    ],
+)
+def test_swatches_have_the_colours_that_are_written_beside_them(
+    reader, monkeypatch, said, colors, remarks
+):
+    monkeypatch.setattr(StandIn, "said", said)
+    monkeypatch.setattr(StandIn, "top", 336)
+    found = read(sheet_with_swatches())
+    assert tuple(one.color for one in found.swatches) == colors
+    assert [line for line in found.remarks if "swatch of" in line] == remarks
+    assert not any(view.caption for view in found.views)
