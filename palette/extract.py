@@ -37,6 +37,7 @@ from toonset.palette.shaded import (
     find_shaded_palette,
     is_shaded,
     pick_shaded_palette,
+    ramps_of,
     shaded_labels,
 )
 from toonset.view import View
@@ -371,8 +372,9 @@ def maps_in_light(
     space: Space = "rgb",
 ) -> list[PaintMap]:
     """Return labels and tones of what `in_light` returns."""
-    if palette.has_ramps:
-        return [PaintMap(labels, None) for labels in shaded_labels(pictures, palette)]
+    ramps = ramps_of(palette)
+    if ramps:
+        return [PaintMap(labels, None) for labels in shaded_labels(pictures, ramps)]
     if dark is not None and palette.shadow is not None:
         both = own_shadow_maps(pictures, dark, palette, space)
         maps, dark = [labels for labels, _ in both], [shade for _, shade in both]

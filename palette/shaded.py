@@ -166,19 +166,33 @@ def pick_shaded_palette(
     return Palette(colors, rule, (), notes)
 
 
-def shaded_labels(pictures: Sequence[Picture], palette: Palette) -> list[Map]:
-    """Return every opaque pixel's paint, 255 elsewhere."""
-    ramps = [ramp_of(color) for color in palette.colors]
-    return [_labels(picture, ramps) for picture in pictures]
+def shaded_labels(pictures: Sequence[Picture], ramps: Sequence[Ramp]) -> list[Map]:
+    """Return which ramp every opaque pixel's paint is, 255 elsewhere."""
+    return [
+        enlarged_labels(_drawing(picture).labels(ramps)[0], picture, ramps) for picture in pictures
+    ]
+
+
+def ramps_of(palette: Palette) -> tuple[Ramp, ...]:
+    """Return the ramps of a painted sheet's palette; none of any other."""
+    return tuple(map(ramp_of, palette.colors)) if palette.has_ramps else ()
 
 
 def ramp_of(color: PaletteColor) -> Ramp:
     """Return a palette colour's ramp; of one without tones the ray through black."""
-    stops = shaded_oklab_from_rgb(np.array([t.rgb for t in color.tones] or [color.rgb], np.uint8))
+    if not color.tones:
+        return plain_ramp(np.array(color.rgb, np.uint8))
+    stops = shaded_oklab_from_rgb(np.array([tone.rgb for tone in color.tones], np.uint8))
     order = np.argsort(stops[:, 0], kind="stable")
     light = float(shaded_oklab_from_rgb(np.array(color.rgb, np.uint8))[0])
     spread = float(stops[order[-1], 0] - stops[order[0], 0]) / (2 * OF_SPREAD)
     return Ramp(stops[order], light, spread)
+
+
+def plain_ramp(rgb: UInt8[np.ndarray, " 3"]) -> Ramp:
+    """Return the ray through black of a colour of which no tones are known."""
+    stop = shaded_oklab_from_rgb(rgb)
+    return Ramp(stop[None], float(stop[0]), 0.0)
 
 
 def _drawing(picture: Picture) -> _Drawing:
@@ -356,8 +370,3 @@ def _doubts(palette: Palette) -> tuple[str, ...]:
         f"the paints of {100 * share:.0f} % of the character are a guess ({named}): texture or "
         "blended paint; name the colours with --colors",
     )
-
-
-def _labels(picture: Picture, ramps: Sequence[Ramp]) -> Map:
-    """Return a drawing's labels at its own size."""
-    return enlarged_labels(_drawing(picture).labels(ramps)[0], picture, ramps)

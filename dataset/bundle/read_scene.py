@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import cast
 
@@ -26,6 +27,7 @@ from toonset.palette.extract import IN_LIGHT, IN_SHADOW
 from toonset.palette.formats.json import read_palette_json
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.labels import UNLABELLED
+from toonset.palette.shaded import ramps_of
 from toonset.symmetric import SYMMETRIC, Symmetric
 
 MANNEQUIN, CALIBRATION = "mannequin.obj", "calibration.json"
@@ -59,8 +61,10 @@ def read_scene(path: Path) -> Scene:
     mannequin = member(root, MANNEQUIN)
     mesh = None if mannequin is None else load_mesh(mannequin)
     said = symmetric_of(root)
-    colors, shadow = (None, None) if palette is None else (palette.rgb, palette.shadow)
-    return Scene(tuple(frames), colors, str(path), mesh, shadow, said)
+    scene = Scene(tuple(frames), None, str(path), mesh, symmetric=said)
+    if palette is None:
+        return scene
+    return replace(scene, palette=palette.rgb, shadow=palette.shadow, ramps=ramps_of(palette))
 
 
 def symmetric_of(root: Path) -> Symmetric:

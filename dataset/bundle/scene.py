@@ -10,6 +10,7 @@ from jaxtyping import UInt8
 from toonset.camera import Camera
 from toonset.mesh import Mesh
 from toonset.palette.palette import Shadow
+from toonset.palette.pixels.ramp_labels import Ramp
 from toonset.symmetric import Symmetric
 
 
@@ -43,6 +44,7 @@ class Scene:
         mannequin: as calibration fitted it, in the cameras' world; None: there is none.
         symmetric: whether the artist says that the sides are mirror images: "auto", "on" or "off".
         shadow: of drawings that are shaded in two tones; None: they are flat, or nobody looked.
+        ramps: of the palette's colours, where the drawings are shaded throughout.
     """
 
     frames: tuple[Frame, ...]
@@ -51,3 +53,4 @@ class Scene:
     mannequin: Mesh | None = None
     shadow: Shadow | None = None
     symmetric: Symmetric = "auto"
+    ramps: tuple[Ramp, ...] = ()

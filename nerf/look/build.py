@@ -94,7 +94,9 @@ def drawings_of(
     )
     palette = ready.palette if ready.palette is not None else _common_colors(views)
     found = Drawings(views, (), line, line, palette, height, extent, bent, shape)
-    found = replace(found, steps=flat.steps, shade=flat.shade, shadow=ready.shadow)
+    found = replace(found, steps=flat.steps, shade=flat.shade)
+    if ready.palette is not None:
+        found = replace(found, shadow=ready.shadow, ramps=ready.ramps)
     return found.with_flows(pair_flows(found, depth_of))
 
 

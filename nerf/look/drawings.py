@@ -22,6 +22,8 @@ from toonset.nerf.look.step_lines import StepLines, step_edges
 from toonset.nerf.sections.roles import hull_is_square
 from toonset.palette.palette import Shadow
 from toonset.palette.pixels.labels import nearest_colors
+from toonset.palette.pixels.ramp_labels import Ramp
+from toonset.palette.shaded import plain_ramp
 from toonset.raster import depth_inside, distance_to, nearest, sized_parts, taken
 
 STEP = 0.03  # of the figure's height: surfaces so far apart in depth are two
@@ -119,6 +121,7 @@ class Drawings:
         steps: lines at steps in depth; None: there are none, or the paint has them.
         shade: a shadow that the paint lacks; None: there is none, or the paint has it.
         shadow: that the drawings have, by their palette; None: there is none.
+        ramps: of the palette's colours, where the drawings are shaded throughout.
         repaint: colours to show instead of the palette's, in the same order; None: its own.
     """
 
@@ -134,6 +137,7 @@ class Drawings:
     steps: StepLines | None = None
     shade: Shade | None = None
     shadow: Shadow | None = None
+    ramps: tuple[Ramp, ...] = ()
     repaint: UInt8[np.ndarray, "colors 3"] | None = None
 
     @cached_property
@@ -144,6 +148,12 @@ class Drawings:
         ink = np.array([self.outline.rgb])
         like = np.abs(self.palette.astype(int) - ink).sum(axis=1) < INK_LIKE
         return self.palette if like.any() else np.concatenate([self.palette, ink.astype(np.uint8)])
+
+    @property
+    def paint_ramps(self) -> tuple[Ramp, ...]:
+        """Return the ramps of `paints`; none of drawings that are not shaded throughout."""
+        behind = self.paints[len(self.ramps) :] if self.ramps else ()
+        return (*self.ramps, *(plain_ramp(rgb) for rgb in behind))
 
     @property
     def painted_shadow(self) -> Shadow | None:
@@ -174,12 +184,13 @@ class Drawings:
     @cached_property
     def textures(self) -> tuple[Texture, ...]:
         """Return the drawings, ready to be looked up, in the colours to show."""
-        paints, new, shadow = self.paints, self.new_paints, self.painted_shadow
+        paints, new, ramps = self.paints, self.new_paints, self.paint_ramps
+        shadow = self.painted_shadow
         plain = [_opaque(view.paint) for view in self.views]
-        labels = paint_labels(plain, paints, shadow)
-        plain = repainted(plain, paints, new, shadow)
+        labels = paint_labels(plain, paints, shadow, ramps)
+        plain = repainted(plain, paints, new, shadow, ramps)
         whole, drawn = (
-            repainted(pictures, paints, new, self.drawn_shadow)
+            repainted(pictures, paints, new, self.drawn_shadow, ramps)
             for pictures in ([v.rgba for v in self.views], [v.as_drawn.rgba for v in self.views])
         )
         parts = zip(self.views, whole, drawn, plain, labels, strict=True)

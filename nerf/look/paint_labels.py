@@ -11,31 +11,39 @@ from toonset.palette.extract import in_light
 from toonset.palette.palette import Shadow
 from toonset.palette.pixels.ink_lines import find_contours
 from toonset.palette.pixels.labels import label_pixels, nearest_labels
+from toonset.palette.pixels.ramp_labels import Ramp
 from toonset.palette.pixels.ramp_recolor import recolor_shaded
 from toonset.palette.pixels.recolor import recolor, tone_map, tones_of
-from toonset.palette.shaded import is_shaded, pick_shaded_palette, shaded_labels
+from toonset.palette.shaded import shaded_labels
 
 Picture = UInt8[np.ndarray, "height width 4"]
 Map = UInt8[np.ndarray, "height width"]
 Colors = UInt8[np.ndarray, "paints 3"]
 
 
-def paint_labels(pictures: Sequence[Picture], paints: Colors, shadow: Shadow | None) -> list[Map]:
+def paint_labels(
+    pictures: Sequence[Picture], paints: Colors, shadow: Shadow | None, ramps: Sequence[Ramp] = ()
+) -> list[Map]:
     """Return every opaque pixel's paint: nearest to its colour in light, or whose ramp it is on.
 
     Args:
         pictures: drawings of one sheet.
         paints: at most 255.
         shadow: that lies on the drawings; None: there is none.
+        ramps: of the paints, where the drawings are shaded throughout.
     """
-    if shadow is None and is_shaded(pictures):
-        return _ramp_labels(pictures, paints)
+    if ramps:
+        return shaded_labels(pictures, ramps)
     lit = pictures if shadow is None else _in_light(pictures, shadow)[0]
     return [nearest_labels(picture, paints) for picture in lit]
 
 
 def repainted(
-    pictures: Sequence[Picture], old: Colors, new: Colors, shadow: Shadow | None
+    pictures: Sequence[Picture],
+    old: Colors,
+    new: Colors,
+    shadow: Shadow | None,
+    ramps: Sequence[Ramp] = (),
 ) -> list[Picture]:
     """Return drawings in other paints: see `toonset.palette.pixels.recolor`, `ramp_recolor`.
 
@@ -44,11 +52,12 @@ def repainted(
         old: the paints that they show.
         new: as many others.
         shadow: that lies on the drawings; None: there is none.
+        ramps: of the old paints, where the drawings are shaded throughout.
     """
     if np.array_equal(old, new):
         return list(pictures)
-    if shadow is None and is_shaded(pictures):
-        parts = zip(pictures, _ramp_labels(pictures, old), strict=True)
+    if ramps:
+        parts = zip(pictures, shaded_labels(pictures, ramps), strict=True)
         return [recolor_shaded(picture, labels, old, new) for picture, labels in parts]
     lit, dark, contours = _in_light(pictures, shadow)
     factor = None if shadow is None else shadow.factor
@@ -58,10 +67,6 @@ def repainted(
         own = tone_map(label_pixels(light, old), shade, contour, len(old))
         found.append(recolor(picture, own, contour, *tones))
     return found
-
-
-def _ramp_labels(pictures: Sequence[Picture], paints: Colors) -> list[Map]:
-    return shaded_labels(pictures, pick_shaded_palette(pictures, paints, "the run's palette"))
 
 
 def _in_light(

@@ -38,6 +38,7 @@ from toonset.nerf.look.outline import Outline
 from toonset.nerf.look.shade import Shade
 from toonset.nerf.look.step_lines import StepLines
 from toonset.palette.palette import Shadow
+from toonset.palette.pixels.ramp_labels import Ramp
 from toonset.write import write_bytes
 
 PICTURES, PAINT, SURFACES = "drawings.png", "paint.png", "drawings.safetensors"
@@ -105,6 +106,15 @@ class ShadowRecord(BaseModel):
     bits: Number
 
 
+class RampRecord(BaseModel):
+    """Colours of a paint from dark to light; fields as in `Ramp`."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+    stops: list[tuple[Number, Number, Number]] = Field(min_length=1, max_length=255)
+    light: Number
+    spread: Share
+
+
 class ShapeRecord(BaseModel):
     """Grid of a `Shape`: its origin and step."""
 
@@ -142,6 +152,7 @@ class DrawingsRecord(BaseModel):
     steps: StepsRecord | None
     shade: ShadeRecord | None
     shadow: ShadowRecord | None = None
+    ramps: list[RampRecord] = Field(default=[], max_length=254)
     limbs: list[LimbsRecord] = Field(default=[], max_length=MOST_VIEWS)
     mirrored: list[Count] = Field(default=[], max_length=MOST_VIEWS)
     originals: list[OriginalRecord] = Field(default=[], max_length=MOST_VIEWS)
@@ -164,6 +175,10 @@ class DrawingsRecord(BaseModel):
                 "steps": drawings.steps and asdict(drawings.steps),
                 "shade": drawings.shade and asdict(drawings.shade),
                 "shadow": drawings.shadow and asdict(drawings.shadow),
+                "ramps": [
+                    {"stops": one.stops.tolist(), "light": one.light, "spread": one.spread}
+                    for one in drawings.ramps
+                ],
                 "limbs": [
                     {"number": i, "shape": _where(view.limbs)}
                     for i, view in enumerate(drawings.views)
@@ -220,6 +235,9 @@ def read_drawings(folder: Path, record: DrawingsRecord) -> Drawings:
             holds a camera that cannot be.
         PictureError: a picture is invalid.
     """
+    if record.ramps and len(record.ramps) != len(record.palette):
+        where = f"{folder / 'config.json'}: field.drawings.ramps"
+        raise BundleError(f"{where}: must have one ramp per palette colour; train again")
     try:
         cameras = [camera.camera() for camera in record.cameras]
         places = [pair.camera.camera() for pair in record.pairs]
@@ -267,6 +285,7 @@ def read_drawings(folder: Path, record: DrawingsRecord) -> Drawings:
         None if record.steps is None else StepLines(**record.steps.model_dump()),
         None if record.shade is None else Shade(**record.shade.model_dump()),
         None if record.shadow is None else Shadow(**record.shadow.model_dump()),
+        tuple(Ramp(np.array(one.stops), one.light, one.spread) for one in record.ramps),
     )
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from toonset.errors import PaletteError
-from toonset.nerf.look.paint_labels import repainted
+from toonset.nerf.look.paint_labels import paint_labels, repainted
 from toonset.palette.colors import oklab_from_rgb, rgb_from_oklab, shaded_oklab_from_rgb
 from toonset.palette.extract import choose_palette, extract_palette, paint_maps
 from toonset.palette.formats.json import palette_of, to_json
@@ -14,7 +14,7 @@ from toonset.palette.palette import Palette
 from toonset.palette.pixels.patches import Patches, find_patches, smooth_lab
 from toonset.palette.pixels.ramp_labels import Ramp, savings
 from toonset.palette.recolor import recolor_drawing
-from toonset.palette.shaded import find_shaded_palette, is_shaded
+from toonset.palette.shaded import find_shaded_palette, is_shaded, ramps_of
 from toonset.raster import erode
 
 SKIN, HAIR, COAT, BELT = (230, 180, 145), (110, 64, 42), (50, 96, 160), (190, 40, 44)
@@ -167,14 +167,20 @@ def test_a_look_of_shaded_drawings_keeps_no_old_hue() -> None:
     coat = int(np.abs(old.astype(int) - COAT).sum(axis=1).argmin())
     new = old.copy()
     new[coat] = (170, 90, 30)
-    for before, after, paint in zip(
-        pictures, repainted(pictures, old, new, None), truth, strict=True
-    ):
+    turned = repainted(pictures, old, new, None, ramps_of(palette))
+    for before, after, paint in zip(pictures, turned, truth, strict=True):
         own = erode(paint == 2, 3)
         light = [oklab_from_rgb(one[own, :3])[:, 0] for one in (before, after)]
         assert (after[own, 0] > after[own, 2]).all()
         assert np.corrcoef(light[0], light[1])[0, 1] > 0.99
         assert np.array_equal(after[erode(paint == 0, 3)], before[erode(paint == 0, 3)])
+
+
+def test_a_look_labels_shaded_drawings_as_their_palette_does() -> None:
+    pictures, _, palette = _found()
+    maps = paint_maps(pictures, [np.zeros_like(p[..., 0]) for p in pictures], palette)
+    again = paint_labels(pictures, palette.rgb, None, ramps_of(palette))
+    assert all(np.array_equal(one.labels, own) for one, own in zip(maps, again, strict=True))
 
 
 def _patches(colors: list[tuple[float, float, float]]) -> Patches:

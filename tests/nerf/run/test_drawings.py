@@ -27,6 +27,7 @@ from toonset.nerf.look.drawings import Drawings
 from toonset.nerf.render.views import render
 from toonset.nerf.run.folder import read_field
 from toonset.nerf.train.result import Training
+from toonset.palette.pixels.ramp_labels import Ramp
 
 PICTURES, PAINT, SURFACES = "drawings.png", "paint.png", "drawings.safetensors"
 
@@ -64,6 +65,26 @@ def test_views_are_the_same_after_loading(folder: Path, egg: Drawings) -> None:
     pixels = 8 * 120 * 120
     for name, most in ((PICTURES, 0.5), (PAINT, 0.5), (SURFACES, 1.6)):
         assert (folder / name).stat().st_size < most * pixels
+
+
+def test_ramps_of_painted_drawings_are_the_same_after_loading(
+    tmp_path: Path, training: Training, egg: Drawings
+) -> None:
+    stops = np.array([(0.2, 0.01, 0.02), (0.7, 0.03, 0.06)])
+    ramps = tuple(Ramp(stops + 0.01 * i, 0.5, 0.1) for i in range(len(egg.palette)))
+    result = replace(training.result, drawings=replace(egg, ramps=ramps))
+    folder = written(tmp_path / "egg", replace(training, result=result))
+    loaded = read_field(folder).drawings
+    assert loaded is not None
+    assert len(loaded.paint_ramps) == len(egg.paints)
+    for one, own in zip(ramps, loaded.ramps, strict=True):
+        np.testing.assert_array_equal(one.stops, own.stops)
+        assert (one.light, one.spread) == (own.light, own.spread)
+    for one, own in zip(replace(egg, ramps=ramps).textures, loaded.textures, strict=True):
+        np.testing.assert_array_equal(one.labels, own.labels)
+    config(lambda found: found["field"]["drawings"]["ramps"].pop())(folder)
+    with pytest.raises(BundleError, match="must have one ramp per palette colour; train again"):
+        read_field(folder)
 
 
 def test_limbs_of_single_drawings_are_the_same_after_loading(
