@@ -2,8 +2,9 @@
 
 Every colour that was found has colours that it becomes: itself; the one that it is merged into;
 those that it is split into; all that are left, if it is dropped. A pixel that was labelled with it
-gets the nearest of them, so no other pixel changes. Shares and tones go the same way. Labels are
-numbered anew, since colours stand by their share, after those that the sheet prints in their order.
+gets the nearest of them (on painted sheets: the one on whose ramp it lies), so no other pixel
+changes. Shares and tones go the same way. Labels are numbered anew, since colours stand by their
+share, after those that the sheet prints in their order.
 """
 
 from __future__ import annotations
@@ -23,8 +24,10 @@ from toonset.palette.names import RGB, hex_of, rgb_of_hex
 from toonset.palette.palette import ContourColor, Palette, PaletteColor, Tone
 from toonset.palette.pixels.antialias import OPAQUE
 from toonset.palette.pixels.labels import UNLABELLED, Space, nearest_colors
+from toonset.palette.pixels.ramp_labels import Ramp
 from toonset.palette.pixels.shadow import apply_shadow
 from toonset.palette.printed import printed_places
+from toonset.palette.shaded import plain_ramp, ramp_of, shaded_labels, with_own_tones
 
 Picture = UInt8[np.ndarray, "height width 4"]
 Map = UInt8[np.ndarray, "height width"]
@@ -89,9 +92,14 @@ def correct_palette(
     lit, dark = in_light(pictures, contours, found.shadow)
     maps = maps_in_light(lit, dark, contours, found, space)
     plan = _plan(found, wanted, f"{where}: palette")
-    moved = [_moved(one.labels, light, plan, space) for one, light in zip(maps, lit, strict=True)]
+    ramps = _ramps(found, plan)
+    moved = [
+        _moved(one.labels, light, plan, space, ramps) for one, light in zip(maps, lit, strict=True)
+    ]
     labels = [own for own, _ in moved]
     colors = _colors(found, plan, np.sum([counts for _, counts in moved], axis=0))
+    if ramps:
+        colors = with_own_tones(colors, pictures, labels)
     names = {plan.number(color, f"names.{color}"): name for color, name in wanted.names.items()}
     told = with_codes([one.name for one in colors], [one.rgb for one in colors])
     colors = [replace(one, name=names.get(i, told[i])) for i, one in enumerate(colors)]
@@ -173,16 +181,40 @@ def _nearest(colors: Sequence[RGB], text: str, key: str) -> int:
     return best
 
 
+def _ramps(found: Palette, plan: _Plan) -> list[Ramp]:
+    """Return the ramps of the final colours of a painted sheet; none of any other.
+
+    That of a colour which was more before may be of all that; it is the ray through black.
+    """
+    if not found.has_ramps:
+        return []
+    own = {o: ramp_of(one) for o, one in zip(plan.old, found.colors, strict=True)}
+    whole = {rgb for rgb, targets in zip(plan.old, plan.becomes, strict=True) if targets == (rgb,)}
+    return [own[rgb] if rgb in whole else plain_ramp(np.array(rgb, np.uint8)) for rgb in plan.final]
+
+
 def _moved(
-    labels: Map, picture: Picture, plan: _Plan, space: Space
+    labels: Map, picture: Picture, plan: _Plan, space: Space, ramps: Sequence[Ramp]
 ) -> tuple[Map, Int[np.ndarray, "old final"]]:
-    """Return labels by final colours, and how many pixels of each colour went where."""
+    """Return labels by final colours, and how many pixels of each colour went where.
+
+    Args:
+        labels: by old colours.
+        picture: in light.
+        plan: what every colour becomes.
+        space: in which nearest is meant.
+        ramps: of the final colours; empty where the sheet is not painted.
+    """
     moved = np.full_like(labels, UNLABELLED)
     counts = np.zeros((len(plan.old), len(plan.final)), dtype=np.int64)
     for number, targets in enumerate(plan.becomes):
         own = labels == number
         at = np.array([plan.final.index(rgb) for rgb in targets], dtype=np.uint8)
-        pick = nearest_colors(picture[own][:, :3], np.array(targets, dtype=np.uint8), space=space)
+        if ramps and len(at) > 1 and own.any():
+            pick = shaded_labels([picture], [ramps[i] for i in at])[0][own]
+        else:
+            colors = np.array(targets, dtype=np.uint8)
+            pick = nearest_colors(picture[own][:, :3], colors, space=space)
         moved[own] = at[pick]
         counts[number] = np.bincount(at[pick], minlength=len(plan.final))
     return moved, counts

@@ -178,6 +178,23 @@ def ramps_of(palette: Palette) -> tuple[Ramp, ...]:
     return tuple(map(ramp_of, palette.colors)) if palette.has_ramps else ()
 
 
+def with_own_tones(
+    colors: Sequence[PaletteColor], pictures: Sequence[Picture], labels: Sequence[Map]
+) -> list[PaletteColor]:
+    """Return colours of which those without tones have the ramps that the drawings have of them."""
+    opaque = [picture[..., 3] >= OPAQUE for picture in pictures]
+    label = np.concatenate([own[there] for own, there in zip(labels, opaque, strict=True)])
+    rgb = np.concatenate([own[..., :3][there] for own, there in zip(pictures, opaque, strict=True)])
+    found = []
+    for number, color in enumerate(colors):
+        own = rgb[label == number]
+        if not color.tones:
+            light = shaded_oklab_from_rgb(own)[:, 0].astype(np.float32)
+            color = replace(color, tones=_tones(light, own, len(label)))
+        found.append(color)
+    return found
+
+
 def ramp_of(color: PaletteColor) -> Ramp:
     """Return a palette colour's ramp; of one without tones the ray through black."""
     if not color.tones:
@@ -227,13 +244,15 @@ def _with_share(paint: _Paint, now: _Paint) -> PaletteColor:
 
 
 def _asked_for(patches: Moments, ramps: Sequence[Ramp], wanted: Sequence[RGB]) -> list[Ramp]:
-    """Return ramps of patches near colours to keep that no ramp comes near."""
+    """Return ramps of patches near colours to keep, nearer than to any ramp there is."""
     found = []
     for rgb in wanted:
         lab = shaded_oklab_from_rgb(np.array(rgb, np.uint8))
         if min(_away(ramp, lab) for ramp in ramps) <= JUST_NOTICEABLE:
             continue
-        near = np.linalg.norm(patches.mean - lab, axis=1) <= KEEP_REACH
+        away = np.linalg.norm(patches.mean - lab, axis=1)
+        known = np.min([[_away(ramp, mean) for mean in patches.mean] for ramp in ramps], axis=0)
+        near = (away <= KEEP_REACH) & (away < known)
         if near.any():
             own = patches.at(near)
             found += _ramps(joined(own, np.zeros(len(own.weight), dtype=np.int64)))

@@ -6,8 +6,11 @@ import pytest
 from toonset.errors import PaletteError
 from toonset.nerf.look.paint_labels import paint_labels, repainted
 from toonset.palette.colors import oklab_from_rgb, rgb_from_oklab, shaded_oklab_from_rgb
+from toonset.palette.corrected import correct_palette
+from toonset.palette.corrections import Divided, PaletteCorrections
 from toonset.palette.extract import choose_palette, extract_palette, paint_maps
 from toonset.palette.formats.json import palette_of, to_json
+from toonset.palette.names import hex_of
 from toonset.palette.paints.ramps import join_patches, moments_of
 from toonset.palette.paints.select import PaletteOptions
 from toonset.palette.palette import Palette
@@ -233,3 +236,19 @@ def test_what_a_ramp_saves_is_what_its_pixels_cost_as_another() -> None:
     assert coat == pytest.approx(0)
     assert twin == 0
     assert np.isinf(savings(lab, np.zeros_like(labels), ramps[:1])).all()
+
+
+def test_colours_that_are_merged_keep_a_ramp_and_are_parted_again_by_it() -> None:
+    pictures, truth, found = _found()
+    contours = [np.zeros_like(picture[..., 0]) for picture in pictures]
+    pair = hex_of(found.colors[0].rgb), hex_of(found.colors[1].rgb)
+    one, _ = correct_palette(pictures, contours, found, PaletteCorrections(merge=(pair,)))
+    assert len(one.colors) == len(found.colors) - 1
+    assert all(len(color.tones) == len(found.colors[0].tones) for color in one.colors)
+    parted = PaletteCorrections(split=(Divided(pair[0], pair),))
+    two, maps = correct_palette(pictures, contours, one, parted)
+    number = {color.rgb: at for at, color in enumerate(found.colors)}
+    table = np.array([number[color.rgb] for color in two.colors])
+    for own, old, paint in zip(maps, paint_maps(pictures, contours, found), truth, strict=True):
+        inside = erode(paint < 255, 2)
+        assert (table[own.labels[inside]] == old.labels[inside]).mean() > 0.97
