@@ -310,7 +310,8 @@ def _in_light(
     found = found[: options.max_colors - len(palette.colors)]
     if found:
         wider = replace(options, keep=(*options.keep, *found))
-        palette = replace(find_palette(pictures, wider, lines), features=found)
+        wide = find_palette(pictures, wider, lines)
+        palette = replace(wide, features=found, rule=palette.rule)
     return add_places(palette, pictures)
 
 

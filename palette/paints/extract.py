@@ -20,6 +20,7 @@ from toonset.palette.names import hex_of
 from toonset.palette.paints.areas import paint_areas
 from toonset.palette.paints.clusters import Paint, find_paints
 from toonset.palette.paints.histogram import Histogram, count_pixels
+from toonset.palette.paints.lost import with_lost
 from toonset.palette.paints.places import patches_of, pixels_of
 from toonset.palette.paints.select import Amount, PaletteOptions, choose, measure, with_wanted
 from toonset.palette.paints.small_features import near_equal_paints, tiny_paints
@@ -67,13 +68,14 @@ def find_palette(
     found = find_paints(histogram)
     near = near_equal_paints(histogram, found.paints, max(options.min_share, LEAST_LISTED))
     tiny = tiny_paints(histogram, found.paints, found.specks)
-    paints, hidden = with_wanted(found.paints, [*near, *tiny], options.keep)
+    whole = with_lost(histogram, found.paints, images, contours)
+    paints, hidden = with_wanted(whole, [*near, *tiny], options.keep)
     areas = paint_areas(histogram, paints, contours)
     amounts, ink = measure(paints, areas, options)
     kept, left, warnings = choose(amounts, options)
     colors = tuple(PaletteColor(a.paint.rgb, a.share, name_of(a.paint.rgb)) for a in kept)
     warnings += wide_paint_notes(histogram, [a.paint for a in kept], options.min_share)
-    warnings += lone_spot_notes(histogram, [*found.paints, *tiny])
+    warnings += lone_spot_notes(histogram, [*whole, *tiny])
     contour = None if ink is None else _contour(amounts[ink])
     dropped = _dropped(left, hidden, histogram, colors)
     return Palette(colors, _rule(options, contour), dropped, warnings, contour, found.evidence)

@@ -22,6 +22,7 @@ from toonset.palette.pixels.shadow import apply_shadow
 
 RGB = tuple[int, int, int]
 
+WORN, TOLD = 0.01, 2 * JUST_NOTICEABLE  # of the character; in OKLab, from the palette: shoes, belts
 SMALL = 0.05  # of the character: more is no feature, whatever share is asked for
 PLACES = 2  # drawings that show it, or patches in a single one
 THICK = 3  # pixels: a patch of a blend is thinner
@@ -41,7 +42,11 @@ def find_features(
         shadow: that was taken off: what looks like a colour of the palette in it was left there.
     """
     small = [color for color in palette.dropped if color.share < SMALL]
-    unlike = [color.rgb for color in small if color.cost >= UNLIKE]
+    unlike = [
+        color.rgb
+        for color in small
+        if color.cost >= UNLIKE or (color.share >= WORN and color.cost >= TOLD)
+    ]
     if shadow is not None:
         shades = oklab_from_rgb(apply_shadow(palette.rgb, shadow.factor))
         unlike = [rgb for rgb in unlike if _away(rgb, shades) > LEFT]
@@ -80,7 +85,8 @@ def _recurs(
         heights += level.tolist()
     if not heights:
         return False
-    middle = np.median(heights)
-    there = int((np.abs(np.array(heights) - middle) <= ALIKE).sum())
-    area = np.array(patches_px)[np.abs(np.array(levels) - middle) <= ALIKE].sum()
-    return there >= max(PLACES, (len(heights) + 1) // 2) and int(area) >= LEAST_PX
+    at, every, areas = (np.array(some) for some in (heights, levels, patches_px))
+    there = [int((np.abs(at - height) <= ALIKE).sum()) for height in heights]
+    most = heights[int(np.argmax(there))]
+    area = int(areas[np.abs(every - most) <= ALIKE].sum())
+    return max(there) >= max(PLACES, (len(heights) + 1) // 2) and area >= LEAST_PX

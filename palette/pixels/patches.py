@@ -81,9 +81,14 @@ def smooth_lab(picture: Picture) -> tuple[Lab, Bool[np.ndarray, "height width"]]
     known = inside | (opaque & ~dilate(inside, RIM_PX))
     if known.any():
         rgb = np.ascontiguousarray(rgb[nearest(known)])
+    return shaded_oklab_from_rgb(without_grain(rgb)).astype(np.float32), opaque
+
+
+def without_grain(rgb: UInt8[np.ndarray, "height width 3"]) -> UInt8[np.ndarray, "height width 3"]:
+    """Return a shrunk drawing without grain and brush."""
     for _ in range(2):
-        rgb = cv2.bilateralFilter(rgb, WINDOW_PX, GRAIN, NEAR_PX)
-    return shaded_oklab_from_rgb(rgb).astype(np.float32), opaque
+        rgb = np.asarray(cv2.bilateralFilter(rgb, WINDOW_PX, GRAIN, NEAR_PX))
+    return rgb
 
 
 def find_patches(lab: Lab, opaque: Bool[np.ndarray, "height width"]) -> tuple[Numbers, Patches]:

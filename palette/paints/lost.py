@@ -1,0 +1,155 @@
+"""Find paints that flat pixels do not tell of: areas of a figure that no paint is like.
+
+What is sketched has no flat pixel, shades that touch count as one paint, and cloth whose colour
+lies between two others' counts as their blend. A blend is a border, though, and borders are thin:
+an area with edges is a paint of its own, one that passes into what is beside it is a shade of that.
+Drawings are looked at no taller than `TALL_PX`, without grain, where no line is
+drawn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Int, UInt8
+
+from toonset.palette.colors import JUST_NOTICEABLE, even_oklab_from_rgb
+from toonset.palette.paints.clusters import UNLIKE, Paint
+from toonset.palette.paints.features import LEAST_PX
+from toonset.palette.paints.histogram import Histogram
+from toonset.palette.paints.line_color import rounded
+from toonset.palette.pixels.antialias import OPAQUE
+from toonset.palette.pixels.patches import shrunk, without_grain
+from toonset.raster import dilate, erode, nearest
+
+FAR = 5 * JUST_NOTICEABLE  # in OKLab, from every paint: the middle of a lost one
+GROUP = 3 * JUST_NOTICEABLE  # in OKLab, from its middle: a lost paint's pixels
+BEYOND_PX, STEP = 3, 2 * JUST_NOTICEABLE  # from an area; in OKLab: less is no edge
+PASSAGE = 0.5  # of an area's border to paint without an edge: more makes it a shade of that
+OF_LINES = 0.25  # of a shrunk pixel that is drawn line: more is no paint
+THICK = np.ones((3, 3), dtype=np.uint8)
+MOST = 20  # paints of one character that are looked for
+
+Mask = Bool[np.ndarray, "height width"]
+Places = Float[np.ndarray, "n 3"]
+
+
+@dataclass(eq=False)
+class _Seen:
+    """A shrunk drawing in OKLab, where it is paint, and where no known paint is like it."""
+
+    lab: Float[np.ndarray, "height width 3"]
+    paint: Mask
+    unlike: Mask
+
+
+def with_lost(
+    histogram: Histogram,
+    paints: Sequence[Paint],
+    images: Sequence[UInt8[np.ndarray, "_ _ 4"]],
+    contours: Sequence[Bool[np.ndarray, "_ _"]] | None = None,
+) -> list[Paint]:
+    """Return the paints, and those of areas that none of them is like, with what is like these.
+
+    Args:
+        histogram: of the character's pictures.
+        paints: of this histogram.
+        images: these pictures.
+        contours: their drawn lines, if known.
+    """
+    known = even_oklab_from_rgb(np.array([paint.rgb for paint in paints], dtype=np.uint8))
+    lines = contours or [np.zeros(image.shape[:2], dtype=bool) for image in images]
+    pairs = zip(images, lines, strict=True)
+    seen = [_seen(image, line, known) for image, line in pairs if image.size]
+    middles = _middles(seen, known)
+    if not len(middles):
+        return list(paints)
+    places = even_oklab_from_rgb(histogram.colors)
+    nearest, away = _nearest(np.concatenate([known, middles]), places)
+    found = list(paints)
+    for number in range(len(known), len(known) + len(middles)):
+        members = np.flatnonzero((nearest == number) & (away <= GROUP))
+        if not len(members):
+            continue
+        like = members[away[members] <= max(JUST_NOTICEABLE, float(away[members].min()))]
+        rgb = rounded(histogram.colors[like[histogram.counts[like].argmax()]])
+        rest = (np.setdiff1d(one.members, members) for one in found)
+        found = [replace(one, members=own) for one, own in zip(found, rest, strict=True)]
+        found.append(Paint(rgb, members))
+    return found
+
+
+def _seen(
+    picture: UInt8[np.ndarray, "_ _ 4"], line: Bool[np.ndarray, "_ _"], known: Places
+) -> _Seen:
+    small = shrunk(picture)
+    opaque = small[..., 3] >= OPAQUE
+    drawn = cv2.resize(line.astype(np.float32), small.shape[1::-1], interpolation=cv2.INTER_AREA)
+    lab = even_oklab_from_rgb(without_grain(np.ascontiguousarray(small[..., :3])))
+    paint = erode(opaque) & (drawn <= OF_LINES)
+    unlike = np.zeros(opaque.shape, dtype=bool)
+    unlike[paint] = _nearest(known, lab[paint])[1] > UNLIKE
+    return _Seen(lab, paint, _thick(unlike))
+
+
+def _middles(seen: Sequence[_Seen], known: Places) -> Places:
+    """Return the colours of areas that are far from all paints, the largest area's first."""
+    found = []
+    for _ in range(MOST):
+        largest = [_largest(one.unlike) for one in seen]
+        number = int(np.argmax([area.sum() for area in largest]))
+        if not largest[number].any():
+            break
+        middle = np.median(seen[number].lab[largest[number]], axis=0)
+        pixels, borders = 0, []
+        for one, area in zip(seen, largest, strict=True):
+            own = one.unlike & (np.linalg.norm(one.lab - middle, axis=-1) <= GROUP)
+            if one is seen[number]:
+                own |= area
+            one.unlike &= ~own
+            pixels += int(_thick(own).sum())
+            borders.append(_is_passage(one, _thick(own)))
+        border = np.concatenate(borders)
+        passage = border.sum() / max(len(border), 1)
+        away = _nearest(known, middle[None])[1][0]
+        if pixels >= LEAST_PX and passage <= PASSAGE and away >= FAR:
+            found.append(middle)
+    return np.array(found).reshape(-1, 3)
+
+
+def _is_passage(one: _Seen, area: Mask) -> Bool[np.ndarray, " border"]:
+    """Return of the paint round an area, beyond its soft edge, whether it has no edge to that."""
+    if not area.any():
+        return np.zeros(0, dtype=bool)
+    room = BEYOND_PX + 1
+    own, paint = np.pad(area, room), np.pad(one.paint, room)
+    lab = np.pad(one.lab, ((room, room), (room, room), (0, 0)))
+    ring = dilate(own, BEYOND_PX) & ~dilate(own, BEYOND_PX - 1)
+    step = np.linalg.norm(lab[ring] - lab[nearest(own)][ring], axis=-1)
+    return step[paint[ring]] < STEP
+
+
+def _nearest(
+    known: Places, wanted: Places
+) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+    """Return which of some places is nearest to each of others, and how far it is."""
+    from scipy.spatial import KDTree
+
+    away, number = KDTree(known).query(wanted)
+    return np.asarray(number), np.asarray(away)
+
+
+def _thick(mask: Mask) -> Mask:
+    """Return what of a mask is thicker than a blend."""
+    return np.asarray(cv2.morphologyEx(mask.view(np.uint8), cv2.MORPH_OPEN, THICK)).view(bool)
+
+
+def _largest(mask: Mask) -> Mask:
+    """Return the largest connected part of a mask."""
+    count, parts, stats, _ = cv2.connectedComponentsWithStats(mask.view(np.uint8))
+    if count < 2:
+        return np.zeros_like(mask)
+    return np.asarray(parts == 1 + int(stats[1:, cv2.CC_STAT_AREA].argmax()))
