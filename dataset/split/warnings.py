@@ -363,8 +363,8 @@ def _other_groups(found: SheetLayout) -> list[str]:
 def _like_views(found: SheetLayout, views: list[View], rgba: np.ndarray) -> list[str]:
     """Return a line for every drawing left out that is as high as a view, or like a small one.
 
-    Drawings of another row of equal figures are poses or busts, which the row says, and so are
-    those beside the views that do not stand in their row.
+    Lower drawings of another row of equal figures are poses or busts, which the row says, and so
+    are those beside the views that do not stand in their row.
     """
     rows = [row for group in found.groups for row in group.rows if len(row) > 1]
     in_rows = set(np.concatenate([np.zeros(0, int), *rows]).tolist())
@@ -373,9 +373,9 @@ def _like_views(found: SheetLayout, views: list[View], rgba: np.ndarray) -> list
     colors = [view.rgba[view.mask][:, :3] for view in views]
     said, cell = [], found.cell_px
     for number, kind in enumerate(found.grouping.kinds):
-        if kind != "study" or number in in_rows:
-            continue
         x, y, width, height = (int(value) * cell for value in found.blobs.boxes[number])
+        if kind != "study" or (number in in_rows and height < usual):
+            continue
         strays = min(map(abs, _beside_row(y, height, views))) > OFF_ROW
         if height < NEARLY_A_VIEW * usual or strays:
             continue

@@ -232,3 +232,8 @@ def test_a_view_that_keeps_its_shadow_is_doubted_and_grey_shoes_are_not(shoes: b
             cv2.ellipse(page, (x + 56, 320), (40, 7), 0, 0, 360, (205, 205, 205, 255), -1)
     told = [line for line in split_picture(page).warnings if "with its shadow" in line]
     assert [line.split()[1] for line in told] == ([] if shoes else ["001.png"])
+
+
+def test_a_row_that_is_higher_than_the_views_is_doubted() -> None:
+    told = split_picture(make_messy_sheet(3640289164).rgba).warnings  # heads were taken for views
+    assert sum("of 162 % of the views' height was left out" in line for line in told) == 2
