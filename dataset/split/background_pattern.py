@@ -110,6 +110,8 @@ def fit_pattern(
     lags = _lags(rgb, like)
     for coarse in found:
         lattice = Lattice(np.stack([_refined(lags, vector) for vector in coarse.vectors]))
+        if not _are_across(lattice.vectors[0], lattice.vectors[1:])[0]:
+            continue  # both came to the same peak
         low, high = _cell(rgb, like, lattice)
         plate = _laid(rgb, lattice, low, high)
         off = cv2.absdiff(rgb, plate).max(axis=2)
@@ -156,8 +158,7 @@ def _lattices(lags: Float[np.ndarray, "lags_y lags_x"], shorter_side: int) -> li
     for share in LIKE_THE_BEST:
         high = heights >= share * heights.max()
         first = peaks[high][lengths[high].argmin()]
-        sine = np.abs(first[0] * peaks[:, 1] - first[1] * peaks[:, 0])
-        beside = high & (sine >= ACROSS * lengths * np.linalg.norm(first))
+        beside = high & _are_across(first, peaks)
         if not beside.any():
             continue
         second = peaks[beside][lengths[beside].argmin()]
@@ -166,6 +167,17 @@ def _lattices(lags: Float[np.ndarray, "lags_y lags_x"], shorter_side: int) -> li
         if often and not any(np.array_equal(vectors, one.vectors) for one in found):
             found.append(Lattice(vectors))
     return found
+
+
+def _are_across(
+    first: Float[np.ndarray, " 2"], others: Float[np.ndarray, "n 2"]
+) -> Bool[np.ndarray, " n"]:
+    """Return which vectors lead far enough aside of the first to span a lattice with it."""
+    areas = np.abs(first[0] * others[:, 1] - first[1] * others[:, 0])
+    across: Bool[np.ndarray, " n"] = areas > ACROSS * np.linalg.norm(
+        others, axis=1
+    ) * np.linalg.norm(first)
+    return across
 
 
 def _lags(

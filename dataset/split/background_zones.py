@@ -104,7 +104,9 @@ def fit_backdrop(
     else:
         possible = flat & _may_be_backdrop(at_border > 0, away, zones)
         ground = _joined(seeds & flat, possible, meetings, zones)
-        found = ground.sum() > 1 and ground[zones.grown[border]].mean() >= TOGETHER
+        shares = [known[zones.grown[border]].mean() for known in (seeds, ground)]
+        alike = away[np.ix_(seeds, seeds)].max() < LEAST_STEP  # such a border shows no steps
+        found = shares[1] >= TOGETHER and not (alike and shares[0] >= TOGETHER)
     if not found:
         return None
     red, green, blue = (round(float(x)) for x in np.median(values[seeds[zones.labels]], axis=0))

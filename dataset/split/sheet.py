@@ -33,6 +33,7 @@ from toonset.dataset.split.warnings import (
     figure_warnings,
     mark_warnings,
     page_warnings,
+    shadow_warnings,
 )
 from toonset.dataset.split.watermark import Watermark, find_watermark, remove_watermark
 from toonset.errors import SheetError
@@ -198,11 +199,15 @@ def split_picture(
         ground.rgb,
         ground.sure,
         (*page_warnings(pages), *mark_warnings(mark), *border_warnings(ground, found))
-        + (() if by_hand else figure_warnings(found, views, rgba)),
+        + (() if by_hand else figure_warnings(found, views, rgba))
+        + (() if by_hand else shadow_warnings(ground, views, rgba)),
         () if by_hand else _left_out(found),
         (
             *_of_picture(pages, residual, mark),
-            *_remarks(ground, found, holes, papered, 0 if by_hand else len(found.cuts)),
+            *_remarks(
+                *(ground, found, holes, papered),
+                0 if by_hand else sum(cut.made for cut in found.cuts),
+            ),
         ),
         swatches,
         () if by_hand else _groups(found),

@@ -9,12 +9,14 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.dataset.split.background import SURE_ENOUGH, Background, ring_of
-from toonset.dataset.split.figures.blobs import Blobs, find_blobs, shared_colors
-from toonset.dataset.split.figures.grouping import LEAST_PART, NEAR
+from toonset.dataset.split.figures.blobs import find_blobs, shared_colors
 from toonset.dataset.split.figures.open_outlines import LINE, Gap
+from toonset.dataset.split.figures.parts_in_doubt import ALIKE, LEVEL, parts_in_doubt
 from toonset.dataset.split.figures.rows import LEAST_ROW, LOWEST, OFF_ROW, likeness, outline
+from toonset.dataset.split.figures.shadows import dimmed, see_through
 from toonset.dataset.split.pages import Pages
 from toonset.dataset.split.segment import SheetLayout, figure_cells
+from toonset.dataset.split.touching.selection import HEAD
 from toonset.dataset.split.watermark import Watermark
 from toonset.raster import dilate, sized_parts, wider_than
 from toonset.view import View
@@ -22,14 +24,13 @@ from toonset.view import View
 REACHING = 0.1  # of the sheet's border: so much may be figures that reach over its edge
 NEARLY_A_VIEW = 0.5  # of the views' height: something left out that may be a small one
 PROPORTIONS = 1.2  # times the widest view's, or less than its inverse of the narrowest's: no view
-ALIKE = 0.6  # of the colours that the views share among each other: less is another thing
 BROAD = 1.15  # times its own height: wider than arms reach
-NEARER = 1.2  # times the gap between parts and their bodies: so near a part may be another's
 IN_EACH_OTHER = 0.45  # of the smaller one's box
 GREY = 24  # levels between a colour's channels: ink and its soft edges have less
 COLORED = 0.3  # of a view: it is painted
 SAME_POSE = 0.65  # IoU of its outline with the most like other one
-LIKE_SIZED = 1.5  # times the height: a pair of parts
+LEAST_SHADOW = 0.02  # of the height: so much lower than its row
+SHADED = 0.9  # of what is lower: it is shadow
 AS_LIKELY = 0.6  # of the merit of the group that was taken: another may be the turnaround
 WHOLE = 0.6  # of the sheet that one view's box covers though there is text beside it
 WIDE_GAP = 0.05  # of the figure's height: a wider gap may be meant
@@ -41,9 +42,9 @@ STROKES = ("mark", "speck", "text")  # as which pieces of a pencil drawing are l
 BROKEN = 0.05  # of the views' height: gaps between its pieces
 PIECES = 2  # no sword or ruler has more
 CRUMB = 0.01  # of the largest piece: a smaller one is dust beside it
-LEVEL = 0.7  # of their height: beside a view they stand in its row
 SLENDER = 0.12  # of its height: a drawing is no narrower
 WIDE = 1.28  # times the next widest of four or more: two figures, or a study that touches
+TWO_HEADS = 0.68  # of a view's width: two tops that are broader are no ears
 LIMB = 0.12  # of the figure's height: what is no wider is an arm, a scarf or a tail
 BROADER = 1.05  # times the next broadest without those: spread arms alone are a pose
 LOOKED_AT = 200  # pixels: height of the copy of which limbs are taken off
@@ -85,6 +86,44 @@ def border_warnings(ground: Background, found: SheetLayout) -> tuple[str, ...]:
     return (f"only {100 * ground.sure:.0f} % of the sheet's border is background",)
 
 
+def shadow_warnings(
+    ground: Background, views: list[View], rgba: UInt8[np.ndarray, "height width 4"]
+) -> tuple[str, ...]:
+    """Return a line for every view that reaches lower than its row with a shadow alone.
+
+    Grey shoes do so, too, but the figure with the highest feet has them as well.
+    """
+    said = []
+    for view in views:
+        _, top, _, height = view.figure_box
+        row = [view, *(other for other in views if _is_level(top, height, other))]
+        highest = min(row, key=_feet)
+        lower = _feet(view) - _feet(highest)
+        if lower > LEAST_SHADOW * height and (
+            _shaded(ground, view, rgba, lower) >= SHADED > _shaded(ground, highest, rgba, lower)
+        ):
+            said.append(f"view {view.name} stands lower than its row: is it with its shadow?")
+    return tuple(said)
+
+
+def _feet(view: View) -> int:
+    return view.figure_box[1] + view.figure_box[3]
+
+
+def _shaded(ground: Background, view: View, rgba: np.ndarray, rows: int) -> float:
+    """Return which share of a figure's lowest rows is the paper with less light."""
+    x, _, width, _ = view.box
+    top = _feet(view) - rows
+    seen = rgba[top : top + rows, x : x + width]
+    if ground.rgb is None:
+        dim = see_through(seen)
+    else:
+        paper = ground.colors((x, top, width, rows))
+        dim = dimmed(seen[..., :3], paper, ground.tolerance)
+    drawn = view.rgba[top - view.box[1] :, :, 3][:rows] > 0
+    return float(dim.mask[drawn].mean())
+
+
 def figure_warnings(
     found: SheetLayout, views: list[View], rgba: UInt8[np.ndarray, "height width 4"]
 ) -> tuple[str, ...]:
@@ -93,13 +132,16 @@ def figure_warnings(
         *_cuts(found),
         *_open_outlines(found, views),
         *_wide_views(views),
+        *_two_heads(views),
         *_off_row(views),
         *_one_in_another(views),
         *_painted_alone(views),
         *_whole_page(found, views, rgba),
         *_panels(views, rgba),
-        *_near_parts(found, views),
-        *_single_parts(found, views),
+        *parts_in_doubt(
+            *(found.blobs, found.grouping, rgba[:: found.cell_px, :: found.cell_px, :3]),
+            *(found.cell_px, [view.name for view in views]),
+        ),
         *_other_groups(found),
         *_like_views(found, views, rgba),
         *_scattered_strokes(found, views),
@@ -110,6 +152,12 @@ def _cuts(found: SheetLayout) -> list[str]:
     said = []
     for cut in (cut for cut in found.cuts if cut.in_doubt):
         x, y, width, height = (value * found.cell_px for value in cut.box)
+        if not cut.made:
+            said.append(
+                f"a study may touch the figure within {width} x {height} px at {x}, {y}; it was "
+                "not cut off: look, or give all views with --boxes"
+            )
+            continue
         two = "two figures touch" if cut.study is None else "a figure and a study touch"
         said.append(
             f"{two} within {width} x {height} px at {x}, {y}; they were cut apart "
@@ -183,6 +231,23 @@ def _wide_views(views: list[View]) -> list[str]:
         others = bodies[:number] + bodies[number + 1 :]
         if width > BROAD or bodies[number] > BROADER * max(others):
             said.append(f"view {views[number].name} is unusually wide: do two figures touch?")
+    return said
+
+
+def _two_heads(views: list[View]) -> list[str]:
+    """Return a line for every view with two heads: broad tops, apart, that are most of its width.
+
+    Ears and raised claws leave more of it to the body.
+    """
+    said = []
+    for view in views:
+        left, top, width, height = view.figure_box
+        x, y, depth = left - view.box[0], top - view.box[1], max(1, round(HEAD * height))
+        tops = find_blobs(view.mask[y : y + depth, x : x + width])
+        broad = np.bincount(tops.labels[-1], minlength=len(tops.areas) + 1)[1:]
+        heads = broad[(broad >= depth) & (tops.boxes[:, 1] <= OFF_ROW * height)]
+        if len(heads) > 1 and heads.sum() >= TWO_HEADS * width:
+            said.append(f"view {view.name} has two heads: do two figures touch?")
     return said
 
 
@@ -280,98 +345,6 @@ def _panels(views: list[View], rgba: np.ndarray) -> list[str]:
     ]
 
 
-def _near_parts(found: SheetLayout, views: list[View]) -> list[str]:
-    """Return a line for every part apart that stands as near to another view as parts do.
-
-    Not where it is one of a pair, or where the other view has its own between that and its body.
-    """
-    parts, bodies = _parts_apart(found)
-    own = [_gap(found.blobs, n, bodies[k]) for n, k in parts]
-    reach = NEARER * max((gap for gap in own if np.isfinite(gap)), default=0.0)
-    said = []
-    for (number, figure), gap in zip(parts, own, strict=True):
-        alike = [(n, k) for n, k in parts if n != number and _is_like(found.blobs, number, n)]
-        for other, body in enumerate(bodies):
-            away = _gap(found.blobs, number, body)
-            if other == figure or not np.isfinite(gap) or away > reach:
-                continue
-            paired = gap <= away and _is_paired(
-                found.blobs, number, [n for n, k in alike if k == figure], bodies[figure]
-            )
-            theirs = [n for n, k in alike if k == other]
-            if not paired and not _is_one_between(found.blobs, number, theirs, body):
-                x, y, _, _ = (int(value) * found.cell_px for value in found.blobs.boxes[number])
-                said.append(
-                    f"a part at {x}, {y} went to view {views[figure].name}: "
-                    f"is it a part of {views[other].name}, which is near, too?"
-                )
-    return said
-
-
-def _single_parts(found: SheetLayout, views: list[View]) -> list[str]:
-    """Return a line for every part far beside its body that has no like: it may be a prop."""
-    parts, bodies = _parts_apart(found)
-    said = []
-    for number, figure in parts:
-        gap = _gap(found.blobs, number, bodies[figure])
-        x, y, _, _ = (int(value) * found.cell_px for value in found.blobs.boxes[number])
-        beside = NEAR < gap < np.inf
-        if beside and not any(n != number and _is_like(found.blobs, number, n) for n, _ in parts):
-            said.append(
-                f"a thing at {x}, {y} apart from view {views[figure].name} was taken for its part: "
-                "is it one?"
-            )
-    return said
-
-
-def _is_like(blobs: Blobs, part: int, other: int) -> bool:
-    """Return whether two parts are about equally high and at one level, as two hands are."""
-    (_, y, _, height), (_, top, _, tall) = blobs.boxes[part], blobs.boxes[other]
-    level = min(y + height, top + tall) - max(y, top) >= LEVEL * min(height, tall)
-    return bool(level and max(height, tall) <= LIKE_SIZED * min(height, tall))
-
-
-def _middle(blobs: Blobs, number: int) -> float:
-    return float(blobs.boxes[number, 0] + blobs.boxes[number, 2] / 2)
-
-
-def _is_paired(blobs: Blobs, part: int, alike: list[int], body: int) -> bool:
-    """Return whether a body has one part on each side, of which this is one."""
-    middle = _middle(blobs, body)
-    left = _middle(blobs, part) < middle
-    beside = [(_middle(blobs, other) < middle) == left for other in alike]
-    return len(beside) > 0 and not any(beside)
-
-
-def _is_one_between(blobs: Blobs, part: int, theirs: list[int], body: int) -> bool:
-    """Return whether one of a view's own parts lies between another's part and its body."""
-    ends = sorted((_middle(blobs, part), _middle(blobs, body)))
-    return any(ends[0] < _middle(blobs, number) < ends[1] for number in theirs)
-
-
-def _parts_apart(found: SheetLayout) -> tuple[list[tuple[int, int]], list[int]]:
-    """Return patches that are parts, with the numbers of their views, and the views' bodies."""
-    parts, bodies = list[tuple[int, int]](), list[int]()
-    areas = found.blobs.areas
-    for figure in range(found.grouping.count):
-        own = np.flatnonzero(found.grouping.figure_of_blob == figure)
-        bodies.append(int(own[areas[own].argmax()]))
-        least = LEAST_PART * areas[bodies[-1]]
-        parts += [(int(n), figure) for n in own if n != bodies[-1] and areas[n] >= least]
-    return parts, bodies
-
-
-def _gap(blobs: Blobs, part: int, body: int) -> float:
-    """Return how far a part is beside a body, in the body's heights; infinite at no level of it."""
-    x, y, width, height = blobs.boxes[part]
-    left, top, _, tall = blobs.boxes[body]
-    beside = blobs.mask(body)[max(0, y - top) : max(0, y + height - top)]
-    columns = np.flatnonzero(beside.any(axis=0))
-    if not len(columns):
-        return np.inf
-    return float(max(left + columns[0] - x - width, x - left - columns[-1] - 1, 0) / tall)
-
-
 def _other_groups(found: SheetLayout) -> list[str]:
     """Return a line for every other group that may be the turnaround, too."""
     taken = found.groups[found.taken.group]
@@ -390,8 +363,8 @@ def _other_groups(found: SheetLayout) -> list[str]:
 def _like_views(found: SheetLayout, views: list[View], rgba: np.ndarray) -> list[str]:
     """Return a line for every drawing left out that is as high as a view, or like a small one.
 
-    Drawings of another row of equal figures are poses or busts, which the row says, and so are
-    those beside the views that do not stand in their row.
+    Lower drawings of another row of equal figures are poses or busts, which the row says, and so
+    are those beside the views that do not stand in their row.
     """
     rows = [row for group in found.groups for row in group.rows if len(row) > 1]
     in_rows = set(np.concatenate([np.zeros(0, int), *rows]).tolist())
@@ -400,9 +373,9 @@ def _like_views(found: SheetLayout, views: list[View], rgba: np.ndarray) -> list
     colors = [view.rgba[view.mask][:, :3] for view in views]
     said, cell = [], found.cell_px
     for number, kind in enumerate(found.grouping.kinds):
-        if kind != "study" or number in in_rows:
-            continue
         x, y, width, height = (int(value) * cell for value in found.blobs.boxes[number])
+        if kind != "study" or (number in in_rows and height < usual):
+            continue
         strays = min(map(abs, _beside_row(y, height, views))) > OFF_ROW
         if height < NEARLY_A_VIEW * usual or strays:
             continue

@@ -15,11 +15,13 @@ from jaxtyping import Bool, Int, UInt8
 from toonset.dataset.split.figures.blobs import Blobs
 from toonset.dataset.split.touching.costs import look_at
 from toonset.dataset.split.touching.profiles import flanks, largest_piece
-from toonset.dataset.split.touching.selection import WIDE_ALONE, Option, best_option, find_options
+from toonset.dataset.split.touching.selection import Option, best_option, find_options
 from toonset.view import Box
 
 WORST = 25.0  # of a cut's badness: what is worse goes through a single figure
-WORST_STUDY = 10.0  # the same of a cut between a figure and a study: right ones have 2 to 8
+WORST_STUDY = 10.0  # the same of a cut between a figure and a study
+WORTH_A_LOOK = 14.0  # the same of one that is not made, but told
+NARROW = 0.3  # times its own height: what is narrower is one figure
 LEAST_HEIGHT = 24  # cells: in a lower patch no two figures can be told
 THROUGH = 0.7  # of an enclosed patch's height that a cut runs through: a gap between two figures
 MOST_ENCLOSED = 0.25  # of a patch in the background's colour: more is a line drawing
@@ -35,12 +37,14 @@ class Cut:
         crossed: paint that the cut goes through, as a share of the height.
         sure: chance that it is right, among the cuts that were found between the two.
         study: number of the patch that is no figure but a smaller drawing, or None.
+        made: the patch was cut; if not, a study may touch it.
     """
 
     box: Box
     crossed: float
     sure: float
     study: int | None = None
+    made: bool = True
 
     @property
     def in_doubt(self) -> bool:
@@ -103,18 +107,19 @@ def part_touching(
     while queue:
         label = queue.pop()
         box = patches.boxes[label]
-        if box[2] < WIDE_ALONE * box[3] or box[3] < LEAST_HEIGHT:
+        if box[2] < NARROW * box[3] or box[3] < LEAST_HEIGHT:
             continue
         cut = _part(patches, label, top + 1)
         if cut is not None:
+            cuts.append(cut)
+        if cut is not None and cut.made:
             top += 1
             queue += [one for one in (label, top) if one - 1 != cut.study]
-            cuts.append(cut)
-    return (_measured(patches.labels, top) if cuts else blobs), cuts
+    return (_measured(patches.labels, top) if top > len(blobs.areas) else blobs), cuts
 
 
 def _part(patches: _Patches, label: int, new: int) -> Cut | None:
-    """Cut a patch in two, the right part with a new number; return the cut, or None for none."""
+    """Cut a patch in two, the right part with a new number; return the cut, None for none."""
     window = patches.window(label)
     mask = patches.labels[window] == label
     paint = mask & patches.painted[window]
@@ -126,11 +131,12 @@ def _part(patches: _Patches, label: int, new: int) -> Cut | None:
     options = find_options(
         cut_costs, small, [side for two in patches.sides.values() for side in two]
     )
-    options = [one for one in options if one.badness <= (WORST_STUDY if one.study else WORST)]
-    if not options:
-        return None
-    best, sure = best_option(options, cut_costs.drawn > 0.5)
+    likely = [one for one in options if one.badness <= (WORST_STUDY if one.study else WORST)]
     box = patches.boxes[label]
+    if not likely:
+        told = min((one.badness for one in options), default=np.inf) <= WORTH_A_LOOK
+        return Cut(box, 0.0, 0.0, made=False) if told else None
+    best, sure = best_option(likely, cut_costs.drawn > 0.5)
     columns = _enlarged(best, mask.shape)
     labels = patches.labels[window]
     labels[mask & (np.arange(mask.shape[1]) >= columns[:, None])] = new

@@ -27,7 +27,7 @@ AS_HIGH = 0.7  # of the patch's height: what is left on each side of a cut
 AS_LARGE = 0.3  # of the patch's area: the same, for two figures of equal size less
 HEAD = 0.12  # of the patch's height: a head is as thick, an arm is not
 MOST_STUDY = 0.6  # of the figure's area: a study beside it has no more
-WIDE_ALONE = 0.5  # times its own height: what is wider may be two figures
+HALF_AS_WIDE = 0.5  # times its own height: a figure is rarely wider
 TWO_WIDE = 0.7  # times its own height: what is narrower is rarely two figures
 ALIKE = 0.3  # of two figures' colours that they share; a wing and its body share less
 SAME = 0.0015  # of the paint: two cuts that differ by less are one
@@ -165,7 +165,7 @@ def _crossing(cut_costs: CutCosts, seam: Seam) -> tuple[float, float, float]:
 def _are_figures(inside: np.ndarray, *pieces: np.ndarray) -> bool:
     """Return whether pieces are as high and as large as figures."""
     height, width = inside.shape
-    across = max(2.0, width / (WIDE_ALONE * height))  # a figure is rarely over half as wide
+    across = max(2.0, width / (HALF_AS_WIDE * height))
     least = AS_LARGE * float(inside.sum()) * 2 / across
     for piece in pieces:
         rows = np.flatnonzero(piece.any(axis=1))

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from bench.messy.sheet import make_messy_sheet
 from toonset.cli.editor.scene import sheet_url
 from toonset.dataset.images.zones import find_meetings, find_zones
-from toonset.dataset.split.background import remove_residual_alpha, ring_of
+from toonset.dataset.split.background import find_background, remove_residual_alpha, ring_of
 from toonset.dataset.split.background_zones import fit_backdrop, fit_steps
 from toonset.dataset.split.pages import find_pages, straightened
 from toonset.dataset.split.sheet import Segmentation, split_picture
@@ -562,6 +563,16 @@ def test_a_drawn_frame_is_no_panel() -> None:
         cv2.rectangle(picture, (inset, inset), (1199 - inset, 519 - inset), (30, 50, 120), 4)
     assert fit_backdrop(picture, ring_of(520, 1200), only_panels=True) is None
     assert_right(opaque(picture), truth)
+
+
+def test_a_border_of_one_color_is_no_backdrop_whatever_stands_on_it() -> None:
+    messy = make_messy_sheet(165635304)  # line art: its straight insides were zones of the ground
+    assert find_background(messy.rgba, None).kind != "stepped"
+
+
+def test_a_lattice_needs_two_ways() -> None:
+    messy = make_messy_sheet(933938367)  # both of its vectors came to one peak
+    assert len(split_picture(messy.rgba).views) == len(messy.boxes)
 
 
 def test_zones_meet_in_straight_steps() -> None:

@@ -69,9 +69,16 @@ def test_a_turnaround_of_two_rows_is_not_two_outfits() -> None:
         assert not sheet.groups[0].outfits
 
 
-def test_a_study_that_touches_a_figure_is_cut_off() -> None:
-    messy = make_messy_sheet(4301, ("glued study",))
+@pytest.mark.parametrize("seed", [4301, 3271289844])  # the second at a side view
+def test_a_study_that_touches_a_figure_is_cut_off(seed: int) -> None:
+    messy = make_messy_sheet(seed, ("glued study",))
     assert_right(split_picture(messy.rgba), messy)
+
+
+def test_a_study_that_may_touch_a_figure_is_told() -> None:
+    sheet = split_picture(make_messy_sheet(1893722509, ("glued study",)).rgba)
+    assert ["a study may touch" in line for line in sheet.warnings] == [True]
+    assert not any("cut apart" in remark for remark in sheet.remarks)
 
 
 def figures(*tops: int) -> np.ndarray:

@@ -10,7 +10,7 @@ from bench.messy.sheet import make_messy_sheet
 from toonset.dataset.split.background import find_background
 from toonset.dataset.split.figures.rows import LIKELIEST
 from toonset.dataset.split.segment import find_layout, find_paint
-from toonset.dataset.split.sheet import split_picture
+from toonset.dataset.split.sheet import SheetOptions, split_picture
 from toonset.dataset.split.warnings import border_warnings
 
 
@@ -175,3 +175,65 @@ def test_views_whose_boxes_lie_in_each_other_are_doubted(shift: int, doubted: bo
     found = split_picture(page)
     assert len(found.views) == 2
     assert any("lie in each other" in line for line in found.warnings) is doubted
+
+
+def page_with_hands(hands: list[tuple[int, int]]) -> np.ndarray:
+    """Return three figures 300 px from each other with hands apart, at so many px to each side."""
+    page = np.full((340, 1100, 4), 255, np.uint8)
+    for number, (left, right) in enumerate(hands):
+        x = 200 + 300 * number
+        page[40:320, x : x + 112, :3] = figure(280, (200, 40, 40))
+        for middle in (x - left, x + 111 + right):
+            cv2.circle(page, (middle, 180), 8, (230, 190, 160, 255), -1)
+    return page
+
+
+def test_a_hand_that_lies_over_another_view_is_missed() -> None:
+    assert not split_picture(page_with_hands([(18, 18), (18, 18), (18, 18)])).warnings
+    page = page_with_hands([(40, 40), (40, 40), (40, 40)])
+    page[:, 330:470] = 255  # the second figure stands so near that the first one's hand is on it
+    page[40:320, 340:452, :3] = figure(280, (200, 40, 40))
+    for middle in (352, 412):
+        cv2.circle(page, (middle, 180), 8, (230, 190, 160, 255), -1)
+    told = split_picture(page).warnings
+    assert any("000.png has one part" in line and "over view 001.png" in line for line in told)
+
+
+def test_hands_of_two_views_that_touch_each_other_are_missed() -> None:
+    messy = make_messy_sheet(2279183638, ("floating",))
+    told = split_picture(messy.rgba).warnings
+    assert sum("is like parts of the views" in line for line in told) == 2
+
+
+def test_two_figures_in_one_view_have_two_heads_and_ears_are_none() -> None:
+    page = np.full((400, 400, 4), 255, np.uint8)
+    for x in (100, 240):  # they touch along their arms and their feet
+        cv2.circle(page, (x, 80), 55, (230, 190, 160, 255), -1)
+        page[120:350, x - 40 : x + 40] = (200, 40, 40, 255)
+        page[150:330, x - 70 : x + 71] = (200, 40, 40, 255)
+    told = split_picture(page, SheetOptions(without=("touching figures",))).warnings
+    assert any("two heads" in line for line in told)
+    rabbit = np.full((400, 400, 4), 255, np.uint8)
+    for x in (150, 240):
+        cv2.ellipse(rabbit, (x, 90), (30, 70), 0, 0, 360, (230, 190, 160, 255), -1)
+    rabbit[140:370, 105:285] = (200, 40, 40, 255)
+    assert not any("two heads" in line for line in split_picture(rabbit).warnings)
+
+
+@pytest.mark.parametrize("shoes", [False, True])
+def test_a_view_that_keeps_its_shadow_is_doubted_and_grey_shoes_are_not(shoes: bool) -> None:
+    page = sheet_of(*[figure(280, (200, 40, 40)) for _ in range(4)])
+    for number in range(4):
+        x = 40 + number * (112 + 60)
+        if shoes:
+            for foot in (x + 22, x + 66):
+                page[312 : 328 if number == 1 else 320, foot : foot + 24, :3] = (150, 150, 150)
+        elif number == 1:
+            cv2.ellipse(page, (x + 56, 320), (40, 7), 0, 0, 360, (205, 205, 205, 255), -1)
+    told = [line for line in split_picture(page).warnings if "with its shadow" in line]
+    assert [line.split()[1] for line in told] == ([] if shoes else ["001.png"])
+
+
+def test_a_row_that_is_higher_than_the_views_is_doubted() -> None:
+    told = split_picture(make_messy_sheet(3640289164).rgba).warnings  # heads were taken for views
+    assert sum("of 162 % of the views' height was left out" in line for line in told) == 2
