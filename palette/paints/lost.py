@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.palette.colors import JUST_NOTICEABLE, even_oklab_from_rgb
-from toonset.palette.paints.clusters import UNLIKE, Paint
+from toonset.palette.paints.clusters import EXACT, UNLIKE, Paint
 from toonset.palette.paints.features import LEAST_PX
 from toonset.palette.paints.histogram import Histogram
 from toonset.palette.paints.line_color import rounded
@@ -28,7 +28,7 @@ from toonset.raster import dilate, erode, nearest
 FAR = 5 * JUST_NOTICEABLE  # in OKLab, from every paint: the middle of a lost one
 GROUP = 3 * JUST_NOTICEABLE  # in OKLab, from its middle: a lost paint's pixels
 BEYOND_PX, STEP = 3, 2 * JUST_NOTICEABLE  # from an area; in OKLab: less is no edge
-PASSAGE = 0.5  # of an area's border to paint without an edge: more makes it a shade of that
+PASSAGE = 0.4  # of an area's border to paint without an edge: more makes it a shade of that
 OF_LINES = 0.25  # of a shrunk pixel that is drawn line: more is no paint
 THICK = np.ones((3, 3), dtype=np.uint8)
 MOST = 20  # paints of one character that are looked for
@@ -74,8 +74,11 @@ def with_lost(
         members = np.flatnonzero((nearest == number) & (away <= GROUP))
         if not len(members):
             continue
-        like = members[away[members] <= max(JUST_NOTICEABLE, float(away[members].min()))]
-        rgb = rounded(histogram.colors[like[histogram.counts[like].argmax()]])
+        flat, counts = histogram.flat[members], histogram.counts[members]
+        own = members[(counts * (away[members] <= JUST_NOTICEABLE)).argmax()]
+        if flat.max() >= EXACT * max(int(flat.sum()), 1):  # blends outnumber a small area's colour
+            own = members[flat.argmax()]
+        rgb = rounded(histogram.colors[own])
         rest = (np.setdiff1d(one.members, members) for one in found)
         found = [replace(one, members=own) for one, own in zip(found, rest, strict=True)]
         found.append(Paint(rgb, members))
