@@ -34,6 +34,7 @@ Map = UInt8[np.ndarray, "height width"]
 
 NEAR_LEVELS = 6  # in every channel: a palette that is found anew can differ by that much
 BY_HAND = "; corrected by hand"  # of a palette's rule
+LEAST_PART = 0.01  # of a painted colour's pixels that each part of a split gets
 FRACTION_BITS = 4  # of a pixel, in which strokes are drawn
 
 
@@ -97,8 +98,10 @@ def correct_palette(
         _moved(one.labels, light, plan, space, ramps) for one, light in zip(maps, lit, strict=True)
     ]
     labels = [own for own, _ in moved]
-    colors = _colors(found, plan, np.sum([counts for _, counts in moved], axis=0))
+    pixels = np.sum([counts for _, counts in moved], axis=0)
+    colors = _colors(found, plan, pixels)
     if ramps:
+        _check_splits(plan, wanted, pixels)
         colors = with_own_tones(colors, pictures, labels)
     names = {plan.number(color, f"names.{color}"): name for color, name in wanted.names.items()}
     told = with_codes([one.name for one in colors], [one.rgb for one in colors])
@@ -193,6 +196,26 @@ def _ramps(found: Palette, plan: _Plan) -> list[Ramp]:
     return [own[rgb] if rgb in whole else plain_ramp(np.array(rgb, np.uint8)) for rgb in plan.final]
 
 
+def _check_splits(
+    plan: _Plan, wanted: PaletteCorrections, pixels: Int[np.ndarray, "old final"]
+) -> None:
+    """Refuse a split of a painted sheet's colour that parts nothing: its ramps would be one.
+
+    Raises:
+        PaletteError: hardly a pixel goes to one of the colours.
+    """
+    for at, split in enumerate(wanted.split):
+        key = f"{plan.where}.split.{at}"
+        own = pixels[_nearest(plan.old, split.color, f"{key}.color")]
+        for number, text in enumerate(split.into):
+            part = own[plan.final.index(rgb_of_hex(text, key))]
+            if part < LEAST_PART * own.sum():
+                raise PaletteError(
+                    f"{key}.into.{number}: hardly a pixel of {split.color} is {text}; give colours "
+                    "that lie in it, farther apart, or use the label brush"
+                )
+
+
 def _moved(
     labels: Map, picture: Picture, plan: _Plan, space: Space, ramps: Sequence[Ramp]
 ) -> tuple[Map, Int[np.ndarray, "old final"]]:
@@ -207,11 +230,14 @@ def _moved(
     """
     moved = np.full_like(labels, UNLABELLED)
     counts = np.zeros((len(plan.old), len(plan.final)), dtype=np.int64)
+    found: dict[tuple[RGB, ...], Map] = {}
     for number, targets in enumerate(plan.becomes):
         own = labels == number
         at = np.array([plan.final.index(rgb) for rgb in targets], dtype=np.uint8)
         if ramps and len(at) > 1 and own.any():
-            pick = shaded_labels([picture], [ramps[i] for i in at])[0][own]
+            if targets not in found:
+                found[targets] = shaded_labels([picture], [ramps[i] for i in at])[0]
+            pick = found[targets][own]
         else:
             colors = np.array(targets, dtype=np.uint8)
             pick = nearest_colors(picture[own][:, :3], colors, space=space)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float32, UInt8
+from jaxtyping import Bool, Float, Float32, UInt8
 
 from toonset.errors import PaletteError
 from toonset.palette.color_names import name_of
@@ -245,13 +245,13 @@ def _with_share(paint: _Paint, now: _Paint) -> PaletteColor:
 
 def _asked_for(patches: Moments, ramps: Sequence[Ramp], wanted: Sequence[RGB]) -> list[Ramp]:
     """Return ramps of patches near colours to keep, nearer than to any ramp there is."""
-    found = []
+    found: list[Ramp] = []
+    known = np.min([_away(ramp, patches.mean) for ramp in ramps], axis=0)
     for rgb in wanted:
         lab = shaded_oklab_from_rgb(np.array(rgb, np.uint8))
-        if min(_away(ramp, lab) for ramp in ramps) <= JUST_NOTICEABLE:
+        if min(_away(ramp, lab) for ramp in (*ramps, *found)) <= JUST_NOTICEABLE:
             continue
         away = np.linalg.norm(patches.mean - lab, axis=1)
-        known = np.min([[_away(ramp, mean) for mean in patches.mean] for ramp in ramps], axis=0)
         near = (away <= KEEP_REACH) & (away < known)
         if near.any():
             own = patches.at(near)
@@ -259,11 +259,11 @@ def _asked_for(patches: Moments, ramps: Sequence[Ramp], wanted: Sequence[RGB]) -
     return found
 
 
-def _away(ramp: Ramp, lab: np.ndarray) -> float:
-    """Return how far a colour lies from a ramp in OKLab."""
-    light = float(np.clip(lab[0], ramp.stops[0, 0], ramp.stops[-1, 0]))
-    hue = ramp.hue_at(np.array([light], np.float32))[0]
-    return float(np.linalg.norm(lab - [light, *hue]))
+def _away(ramp: Ramp, lab: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, "*n"]:
+    """Return how far colours lie from a ramp in OKLab."""
+    light = lab[..., :1].clip(ramp.stops[0, 0], ramp.stops[-1, 0])
+    hue = ramp.hue_at(light[..., 0].astype(np.float32))
+    return np.asarray(np.linalg.norm(lab - np.concatenate([light, hue], axis=-1), axis=-1))
 
 
 def _paints(drawings: Sequence[_Drawing], ramps: Sequence[Ramp]) -> list[_Paint]:

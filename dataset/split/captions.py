@@ -23,7 +23,7 @@ from jaxtyping import UInt8
 from toonset.dataset.split.figures.rows import Taken
 from toonset.dataset.split.sheet import FigureGroup, Segmentation, Swatch
 from toonset.palette.colors import JUST_NOTICEABLE, oklab_from_rgb
-from toonset.palette.names import hex_of, rgb_of_hex
+from toonset.palette.names import RGB, hex_of, rgb_of_hex
 from toonset.view import Box
 
 LONGEST_PX = 2000  # of a sheet as it is read
@@ -32,9 +32,9 @@ BAND = 0.25  # of a figure's height: a text farther below or above it is a title
 ASIDE = 0.1  # of a figure's height: its caption's middle is no farther beside it
 LEAST_SAID = 2  # captions that make a row of figures a turnaround
 LEAST_FUZZY = 6  # letters: "light" is no "right"
-BESIDE = 1.0  # of a swatch's height: its code is no farther from it
 PRINTED = 2 * JUST_NOTICEABLE  # in OKLab: a code and its swatch, a JPEG's even, differ by less
-CODE = re.compile(r"(#?)([0-9a-fA-F]{6})")
+MARKED = re.compile(r"#\s*([0-9a-fA-FOoIlSs]{6})\b")
+PLAIN = re.compile(r"([0-9a-fA-FOoIlSs]{6})")
 DIGITS = str.maketrans("OoIlSs", "001155")  # #D9S43O
 SETTINGS = {  # one thread: the same texts on any number of cores
     "Global.log_level": "critical",
@@ -155,25 +155,36 @@ def _captioned(
 
 def _coded(texts: Sequence[Text], found: Segmentation) -> Segmentation:
     """Return the drawings whose swatches have the colours that are written beside them."""
-    codes = [(t, CODE.fullmatch(t.words.strip().translate(DIGITS))) for t in texts]
-    if not found.swatches or not any(code for _, code in codes):
-        return found
     swatches, remarks = list(found.swatches), list(found.remarks)
-    for text, code in codes:
-        near = [_apart(text.box, one.box) / one.box[3] for one in swatches]
-        if code is None or min(near) > BESIDE:
+    for text in texts:
+        code = _code(text.words)
+        near = [i for i, one in enumerate(swatches) if _apart(text.box, one.box) <= one.box[3]]
+        if code is None or not near:
             continue
-        number = int(np.argmin(near))
-        swatch, said = swatches[number], rgb_of_hex(f"#{code[2].lower()}", "code")
-        colors = oklab_from_rgb(np.array([said, swatch.color], dtype=np.uint8))
-        if np.linalg.norm(colors[0] - colors[1]) <= PRINTED:
-            swatches[number] = Swatch(swatch.box, said)
-        elif code[1]:
+        said, is_sure = code
+        colors = np.array([said, *(swatches[i].color for i in near)], dtype=np.uint8)
+        places = oklab_from_rgb(colors)
+        off = np.linalg.norm(places[1:] - places[0], axis=1)
+        meant = near[int(off.argmin())]
+        if off.min() <= PRINTED:
+            swatches[meant] = Swatch(swatches[meant].box, said)
+        elif is_sure:
+            beside = min(near, key=lambda i: _apart(text.box, swatches[i].box))
             remarks.append(
-                f"the sheet says {hex_of(said)} beside a swatch of {hex_of(swatch.color)}: the "
-                "swatch counts"
+                f"the sheet says {hex_of(said)} beside a swatch of "
+                f"{hex_of(swatches[beside].color)}: the swatch counts"
             )
+    if swatches == list(found.swatches) and len(remarks) == len(found.remarks):
+        return found
     return replace(found, swatches=tuple(swatches), remarks=tuple(remarks))
+
+
+def _code(words: str) -> tuple[RGB, bool] | None:
+    """Return the colour that a text says, and whether it is surely meant as one."""
+    code = MARKED.search(words) or PLAIN.fullmatch(words.strip())
+    if code is None:
+        return None
+    return rgb_of_hex(code[1].translate(DIGITS), "code"), code.re is MARKED
 
 
 def _apart(one: Sequence[float], other: Sequence[float]) -> float:

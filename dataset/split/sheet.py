@@ -193,13 +193,13 @@ def split_picture(
     _check(found, ground, options)
     crops = _crops(found, paint, options)
     views, holes, papered = _views(rgba, ground, crops, options)
-    swatches = _swatches(found)
+    swatches, chosen = _swatches(found), options.taken != LIKELIEST
     return Segmentation(
         tuple(views),
         ground.rgb,
         ground.sure,
         (*page_warnings(pages), *mark_warnings(mark), *border_warnings(ground, found))
-        + (() if by_hand else figure_warnings(found, views, rgba))
+        + (() if by_hand else figure_warnings(found, views, rgba, chosen=chosen))
         + (() if by_hand else shadow_warnings(ground, views, rgba)),
         () if by_hand else _left_out(found),
         (

@@ -102,7 +102,9 @@ def shadow_warnings(
         if lower > LEAST_SHADOW * height and (
             _shaded(ground, view, rgba, lower) >= SHADED > _shaded(ground, highest, rgba, lower)
         ):
-            said.append(f"view {view.name} stands lower than its row: is it with its shadow?")
+            said.append(
+                f"view {view.name} stands lower than its row: does it still include its shadow?"
+            )
     return tuple(said)
 
 
@@ -125,9 +127,20 @@ def _shaded(ground: Background, view: View, rgba: np.ndarray, rows: int) -> floa
 
 
 def figure_warnings(
-    found: SheetLayout, views: list[View], rgba: UInt8[np.ndarray, "height width 4"]
+    found: SheetLayout,
+    views: list[View],
+    rgba: UInt8[np.ndarray, "height width 4"],
+    *,
+    chosen: bool = False,
 ) -> tuple[str, ...]:
-    """Return a line for every cut in doubt, every wide view, all left out that may be views."""
+    """Return a line for every cut in doubt, every wide view, all left out that may be views.
+
+    Args:
+        found: figures and what was left out.
+        views: the figures.
+        rgba: the sheet.
+        chosen: whether a person said which group of figures is wanted: other rows are not.
+    """
     return (
         *_cuts(found),
         *_open_outlines(found, views),
@@ -143,7 +156,7 @@ def figure_warnings(
             *(found.cell_px, [view.name for view in views]),
         ),
         *_other_groups(found),
-        *_like_views(found, views, rgba),
+        *_like_views(found, views, rgba, chosen=chosen),
         *_scattered_strokes(found, views),
     )
 
@@ -360,7 +373,9 @@ def _other_groups(found: SheetLayout) -> list[str]:
     return said
 
 
-def _like_views(found: SheetLayout, views: list[View], rgba: np.ndarray) -> list[str]:
+def _like_views(
+    found: SheetLayout, views: list[View], rgba: np.ndarray, *, chosen: bool
+) -> list[str]:
     """Return a line for every drawing left out that is as high as a view, or like a small one.
 
     Lower drawings of another row of equal figures are poses or busts, which the row says, and so
@@ -374,7 +389,7 @@ def _like_views(found: SheetLayout, views: list[View], rgba: np.ndarray) -> list
     said, cell = [], found.cell_px
     for number, kind in enumerate(found.grouping.kinds):
         x, y, width, height = (int(value) * cell for value in found.blobs.boxes[number])
-        if kind != "study" or (number in in_rows and height < usual):
+        if kind != "study" or (number in in_rows and (chosen or height < usual)):
             continue
         strays = min(map(abs, _beside_row(y, height, views))) > OFF_ROW
         if height < NEARLY_A_VIEW * usual or strays:

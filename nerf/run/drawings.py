@@ -17,13 +17,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 import torch
 from jaxtyping import Shaped, UInt8
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 from safetensors import SafetensorError
 from safetensors.torch import load, save
 from torch import Tensor
@@ -52,6 +53,8 @@ Width = Annotated[float, Field(ge=0, le=LONGEST_PX)]
 Number = Annotated[float, Field(ge=-1e9, le=1e9)]
 Size = Annotated[float, Field(ge=1e-9, le=1e9)]
 Share = Annotated[float, Field(ge=0, le=1)]
+Light = Annotated[float, Field(ge=-0.1, le=1.2)]  # of OKLab; dark ends may lie a little below 0
+Hue = Annotated[float, Field(ge=-1, le=1)]  # a or b of OKLab
 Count = Annotated[int, Field(ge=0, lt=MOST_VIEWS)]
 
 
@@ -110,9 +113,16 @@ class RampRecord(BaseModel):
     """Colours of a paint from dark to light; fields as in `Ramp`."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
-    stops: list[tuple[Number, Number, Number]] = Field(min_length=1, max_length=255)
-    light: Number
+    stops: list[tuple[Light, Hue, Hue]] = Field(min_length=1, max_length=255)
+    light: Light
     spread: Share
+
+    @field_validator("stops")
+    @classmethod
+    def _ascends(cls, stops: list[tuple[float, float, float]]) -> list[tuple[float, float, float]]:
+        if any(one[0] > other[0] for one, other in pairwise(stops)):
+            raise ValueError("must go from dark to light")
+        return stops
 
 
 class ShapeRecord(BaseModel):

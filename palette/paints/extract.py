@@ -20,7 +20,7 @@ from toonset.palette.names import hex_of
 from toonset.palette.paints.areas import paint_areas
 from toonset.palette.paints.clusters import Paint, find_paints
 from toonset.palette.paints.histogram import Histogram, count_pixels
-from toonset.palette.paints.lost import with_lost
+from toonset.palette.paints.lost import add_lost_paints
 from toonset.palette.paints.places import patches_of, pixels_of
 from toonset.palette.paints.select import Amount, PaletteOptions, choose, measure, with_wanted
 from toonset.palette.paints.small_features import near_equal_paints, tiny_paints
@@ -68,7 +68,7 @@ def find_palette(
     found = find_paints(histogram)
     near = near_equal_paints(histogram, found.paints, max(options.min_share, LEAST_LISTED))
     tiny = tiny_paints(histogram, found.paints, found.specks)
-    whole = with_lost(histogram, found.paints, images, contours)
+    whole = add_lost_paints(histogram, found.paints, images, contours)
     paints, hidden = with_wanted(whole, [*near, *tiny], options.keep)
     areas = paint_areas(histogram, paints, contours)
     amounts, ink = measure(paints, areas, options)

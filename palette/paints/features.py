@@ -86,7 +86,8 @@ def _recurs(
     if not heights:
         return False
     at, every, areas = (np.array(some) for some in (heights, levels, patches_px))
-    there = [int((np.abs(at - height) <= ALIKE).sum()) for height in heights]
-    most = heights[int(np.argmax(there))]
+    order = np.sort(at)
+    there = np.searchsorted(order, at + ALIKE, "right") - np.searchsorted(order, at - ALIKE)
+    most = at[there.argmax()]
     area = int(areas[np.abs(every - most) <= ALIKE].sum())
-    return max(there) >= max(PLACES, (len(heights) + 1) // 2) and area >= LEAST_PX
+    return int(there.max()) >= max(PLACES, (len(heights) + 1) // 2) and area >= LEAST_PX

@@ -1,4 +1,4 @@
-"""Find paints that flat pixels do not tell of: areas of a figure that no paint is like.
+"""Find paints without flat pixels: areas of a figure that are unlike every known paint.
 
 What is sketched has no flat pixel, shades that touch count as one paint, and cloth whose colour
 lies between two others' counts as their blend. A blend is a border, though, and borders are thin:
@@ -31,7 +31,7 @@ BEYOND_PX, STEP = 3, 2 * JUST_NOTICEABLE  # from an area; in OKLab: less is no e
 PASSAGE = 0.4  # of an area's border to paint without an edge: more makes it a shade of that
 OF_LINES = 0.25  # of a shrunk pixel that is drawn line: more is no paint
 THICK = np.ones((3, 3), dtype=np.uint8)
-MOST = 20  # paints of one character that are looked for
+MOST = 40  # areas of one character that are looked at
 
 Mask = Bool[np.ndarray, "height width"]
 Places = Float[np.ndarray, "n 3"]
@@ -46,7 +46,7 @@ class _Seen:
     unlike: Mask
 
 
-def with_lost(
+def add_lost_paints(
     histogram: Histogram,
     paints: Sequence[Paint],
     images: Sequence[UInt8[np.ndarray, "_ _ 4"]],
@@ -74,11 +74,10 @@ def with_lost(
         members = np.flatnonzero((nearest == number) & (away <= GROUP))
         if not len(members):
             continue
-        flat, counts = histogram.flat[members], histogram.counts[members]
-        own = members[(counts * (away[members] <= JUST_NOTICEABLE)).argmax()]
-        if flat.max() >= EXACT * max(int(flat.sum()), 1):  # blends outnumber a small area's colour
-            own = members[flat.argmax()]
-        rgb = rounded(histogram.colors[own])
+        flat = histogram.flat[members]
+        exact = flat.max() >= EXACT * max(int(flat.sum()), 1)
+        middle = members[flat.argmax() if exact else away[members].argmin()]
+        rgb = rounded(histogram.colors[middle])
         rest = (np.setdiff1d(one.members, members) for one in found)
         found = [replace(one, members=own) for one, own in zip(found, rest, strict=True)]
         found.append(Paint(rgb, members))
@@ -114,7 +113,7 @@ def _middles(seen: Sequence[_Seen], known: Places) -> Places:
                 own |= area
             one.unlike &= ~own
             pixels += int(_thick(own).sum())
-            borders.append(_is_passage(one, _thick(own)))
+            borders.append(_lacks_edge(one, _thick(own)))
         border = np.concatenate(borders)
         passage = border.sum() / max(len(border), 1)
         away = _nearest(known, middle[None])[1][0]
@@ -123,8 +122,8 @@ def _middles(seen: Sequence[_Seen], known: Places) -> Places:
     return np.array(found).reshape(-1, 3)
 
 
-def _is_passage(one: _Seen, area: Mask) -> Bool[np.ndarray, " border"]:
-    """Return of the paint round an area, beyond its soft edge, whether it has no edge to that."""
+def _lacks_edge(one: _Seen, area: Mask) -> Bool[np.ndarray, " border"]:
+    """Return for each pixel of paint round an area whether no edge parts it from the area."""
     if not area.any():
         return np.zeros(0, dtype=bool)
     room = BEYOND_PX + 1

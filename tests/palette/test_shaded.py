@@ -209,15 +209,14 @@ def test_two_paints_that_nobody_can_tell_apart_are_one(
     assert len(np.unique(join_patches(moments_of([_patches(colors)])))) == paints
 
 
-@pytest.mark.parametrize("width", [1, 2])
-def test_thin_stripes_are_one_paint_in_whatever_light(width: int) -> None:
+def test_thin_stripes_are_one_paint_in_whatever_light() -> None:
     rng = np.random.default_rng(0)
     stripe = (np.array(COAT) + BELT) / 2
     pictures = []
     for seed in range(3):
         rgba, _ = _drawing(seed)
         for row in (90, 100, 110, 145, 155, 165, 175, 185):
-            rgba[row : row + width, 14:76, :3] = np.clip(stripe * rng.uniform(0.3, 1.2), 0, 255)
+            rgba[row, 14:76, :3] = np.clip(stripe * rng.uniform(0.3, 1.2), 0, 255)
         pictures.append(rgba)
     found = find_shaded_palette(pictures, PaletteOptions(min_share=0.001))
     assert len(found.colors) == len(PAINTS) + 1
@@ -252,3 +251,21 @@ def test_colours_that_are_merged_keep_a_ramp_and_are_parted_again_by_it() -> Non
     for own, old, paint in zip(maps, paint_maps(pictures, contours, found), truth, strict=True):
         inside = erode(paint < 255, 2)
         assert (table[own.labels[inside]] == old.labels[inside]).mean() > 0.97
+
+
+def test_a_split_that_parts_nothing_is_refused() -> None:
+    pictures, _, found = _found()
+    contours = [np.zeros_like(picture[..., 0]) for picture in pictures]
+    color, pale = hex_of(found.colors[0].rgb), "#ffffff"
+    nothing = PaletteCorrections(split=(Divided(color, (color, pale)),))
+    with pytest.raises(PaletteError, match=r"palette\.split\.0\.into\.1: hardly a pixel of"):
+        correct_palette(pictures, contours, found, nothing)
+
+
+def test_a_dark_tone_of_a_ramp_is_no_colour_to_keep_besides() -> None:
+    pictures, _, found = _found()
+    dark = found.colors[0].tones[-1].rgb
+    kept = choose_palette(
+        pictures, [np.zeros_like(p[..., 0]) for p in pictures], PaletteOptions(keep=(dark,))
+    )
+    assert len(kept.colors) == len(found.colors)

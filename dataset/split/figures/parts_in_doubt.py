@@ -100,7 +100,7 @@ def parts_in_doubt(
     return [
         *(
             f"a part at {place(number)} went to view {names[parts.figure_of[number]]}: "
-            f"is it a part of {names[other]}, which is near, too?"
+            f"does it belong to {names[other]}, which is as near?"
             for number, other in _near_another(parts)
         ),
         *(

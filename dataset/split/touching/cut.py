@@ -20,7 +20,7 @@ from toonset.view import Box
 
 WORST = 25.0  # of a cut's badness: what is worse goes through a single figure
 WORST_STUDY = 10.0  # the same of a cut between a figure and a study
-WORTH_A_LOOK = 14.0  # the same of one that is not made, but told
+WORTH_A_LOOK = 14.0  # the same of one that is not made, only reported
 NARROW = 0.3  # times its own height: what is narrower is one figure
 LEAST_HEIGHT = 24  # cells: in a lower patch no two figures can be told
 THROUGH = 0.7  # of an enclosed patch's height that a cut runs through: a gap between two figures
@@ -89,7 +89,7 @@ def part_touching(
     painted: Bool[np.ndarray, "height width"],
     rgb: UInt8[np.ndarray, "height width 3"],
 ) -> tuple[Blobs, list[Cut]]:
-    """Return the patches of a sheet with touching figures apart, and the cuts that were made.
+    """Return the patches of a sheet with touching figures apart, and cuts, made or suspected.
 
     Paper that two touching figures enclose between them becomes nobody's.
 

@@ -83,7 +83,7 @@ class StandIn:
 
     said = ("FRONT", "SIDE", "BACK")
     sure = 0.99
-    top = 268
+    top, columns = 268, (70, 200, 330)
     pages = 0
 
     def __init__(self, params):
@@ -98,7 +98,7 @@ class StandIn:
         by = bgr.shape[1] / 420
         top = self.top
         corners = np.array([[-30, top], [30, top], [30, top + 20], [-30, top + 20]], float)
-        boxes = np.stack([corners + np.array([x, 0]) for x in (70, 200, 330)]) * by
+        boxes = np.stack([corners + np.array([x, 0]) for x in self.columns]) * by
         return SimpleNamespace(boxes=boxes, txts=self.said, scores=(self.sure,) * 3)
 
 
@@ -237,7 +237,7 @@ def sheet_with_swatches():
     [
         (("#D85530", "#268A8C", "#2e3a68"), ((216, 85, 48), *SWATCHES[1:]), []),
         (("D85530", "skin", "#2E3A6B"), ((216, 85, 48), SWATCHES[1], (46, 58, 107)), []),
-        (("#D8S53O", "facade", "decade"), ((216, 85, 48), *SWATCHES[1:]), []),
+        (("Hair #D8S53O", "facade", "decade"), ((216, 85, 48), *SWATCHES[1:]), []),
         (
             ("#268A8C", "#268A8C", "#2e3a68"),
             SWATCHES,
@@ -254,3 +254,16 @@ def test_swatches_have_the_colours_that_are_written_beside_them(
     assert tuple(one.color for one in found.swatches) == colors
     assert [line for line in found.remarks if "swatch of" in line] == remarks
     assert not any(view.caption for view in found.views)
+
+
+def test_codes_that_are_wider_than_their_swatches_find_them(reader, monkeypatch):
+    rgba = np.pad(sheet_of_three()[:265], ((0, 120), (0, 0), (0, 0)), constant_values=255)
+    for at, color in enumerate(SWATCHES):
+        rgba[290:330, 150 + 40 * at : 190 + 40 * at, :3] = color
+    codes = ((216, 85, 48), (39, 138, 140), (46, 58, 106))
+    monkeypatch.setattr(StandIn, "said", tuple(f"#{r:02x}{g:02x}{b:02x}" for r, g, b in codes))
+    monkeypatch.setattr(StandIn, "top", 334)
+    monkeypatch.setattr(StandIn, "columns", (170, 210, 250))
+    found = read(rgba)
+    assert tuple(one.color for one in found.swatches) == codes
+    assert not any("swatch of" in line for line in found.remarks)

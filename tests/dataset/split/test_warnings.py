@@ -8,7 +8,7 @@ import pytest
 
 from bench.messy.sheet import make_messy_sheet
 from toonset.dataset.split.background import find_background
-from toonset.dataset.split.figures.rows import LIKELIEST
+from toonset.dataset.split.figures.rows import LIKELIEST, Taken
 from toonset.dataset.split.segment import find_layout, find_paint
 from toonset.dataset.split.sheet import SheetOptions, split_picture
 from toonset.dataset.split.warnings import border_warnings
@@ -230,10 +230,19 @@ def test_a_view_that_keeps_its_shadow_is_doubted_and_grey_shoes_are_not(shoes: b
                 page[312 : 328 if number == 1 else 320, foot : foot + 24, :3] = (150, 150, 150)
         elif number == 1:
             cv2.ellipse(page, (x + 56, 320), (40, 7), 0, 0, 360, (205, 205, 205, 255), -1)
-    told = [line for line in split_picture(page).warnings if "with its shadow" in line]
+    told = [line for line in split_picture(page).warnings if "include its shadow" in line]
     assert [line.split()[1] for line in told] == ([] if shoes else ["001.png"])
 
 
 def test_a_row_that_is_higher_than_the_views_is_doubted() -> None:
     told = split_picture(make_messy_sheet(3640289164).rgba).warnings  # heads were taken for views
     assert sum("of 162 % of the views' height was left out" in line for line in told) == 2
+
+
+@pytest.mark.parametrize("seed", [5001, 5003])
+def test_rows_that_a_person_did_not_choose_are_no_views_left_out(seed: int) -> None:
+    messy = make_messy_sheet(seed, ("outfits",))
+    whole = split_picture(messy.rgba)
+    assert whole.groups[0].outfits
+    row = split_picture(messy.rgba, SheetOptions(taken=Taken(0, 1)))
+    assert not any("was left out" in line for line in row.warnings)
