@@ -5,7 +5,7 @@ segmentation, Zhang et al. 2009, "Vectorizing cartoon animations"). What only a 
 reaches is a pocket: the inside of an open outline, or the gap between legs, between arm and body.
 They are told apart by their walls. Behind the line around a figure lies the outside again; behind
 an arm or a leg, painted or closed, it does not. Each pocket is cut off by the smallest ball that
-does not enter it.
+does not enter it. Paper between two figures is no pocket of either.
 """
 
 from __future__ import annotations
@@ -30,6 +30,8 @@ LEAST_POCKET = 0.002  # of the figure's squared height: smaller pockets are corn
 LINE = 0.012  # of the figure's height: half of the thickest line
 FIRST_LOOK = 0.6  # of the least length: the largest ball touches fewer of the walls
 JOIN = 0.012  # of the figure's height: across gaps so wide lines are of one figure
+TALL, SOLID = 0.6, 0.04  # of the figure's height, and squared: what is less is no figure
+BESIDE = 2  # cells from a pocket: its walls
 STEP = 1.2  # times the ball before: the next
 
 Mask = Bool[np.ndarray, "rows columns"]
@@ -178,6 +180,7 @@ def _close(drawn: Mask, outside: Mask, seeds: Mask, height: float) -> tuple[Mask
     least = OF_LINES if _is_line_drawing(drawn, outside, height) else OF_PAINT
     reached = _reached(room, outside, seeds, least.looked_for * height)
     numbers, areas = sized_parts(outside & ~reached, connectivity=4)
+    bodies = _bodies(drawn, outside, height)
     _, facing = _walls(numbers, len(areas), drawn, reached, height)
     shortest = FIRST_LOOK * least.length * height
     for number in range(1, len(areas)):
@@ -197,9 +200,25 @@ def _close(drawn: Mask, outside: Mask, seeds: Mask, height: float) -> tuple[Mask
         y, x = window[0].start, window[1].start
         for inside, gap in found:
             if gap.closed:
+                beside = np.unique(bodies[window][dilate(inside, BESIDE)])
+                if np.count_nonzero(beside) > 1:
+                    continue
                 pockets[window] |= inside
             gaps.append(replace(gap, x=gap.x + x, y=gap.y + y))
     return pockets, gaps
+
+
+def _bodies(drawn: Mask, outside: Mask, height: float) -> Int[np.ndarray, "rows columns"]:
+    """Return the number of every cell's figure, 0 where there is none: what is high and solid."""
+    numbers, areas = sized_parts(drawn | ~outside, connectivity=8)
+    count = len(areas)
+    rows = np.arange(len(drawn))[:, None] * np.ones((1, drawn.shape[1]), dtype=np.int64)
+    top, bottom = np.full(count, len(drawn)), np.zeros(count, dtype=np.int64)
+    np.minimum.at(top, numbers, rows)
+    np.maximum.at(bottom, numbers, rows)
+    solid = (areas >= SOLID * height**2) & (bottom - top >= TALL * height)
+    solid[0] = False
+    return np.where(solid[numbers], numbers, 0)
 
 
 def _is_line_drawing(drawn: Mask, outside: Mask, height: float) -> bool:

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
+from toonset.dataset.split.figures.open_outlines import close_outlines
 from toonset.dataset.split.sheet import Segmentation, split_picture
 
 PAPER = 250
@@ -111,3 +112,15 @@ def test_a_pencil_outline_is_no_shadow() -> None:
     found = split_picture(_on_paper(cv2.GaussianBlur(ink * grain, (0, 0), 0.7)))
     assert len(found.views) == 3
     assert _iou(found, true) > 0.96
+
+
+def test_paper_between_two_figures_is_no_inside():
+    drawn = np.zeros((400, 400), dtype=bool)
+    for x in (60, 260):
+        drawn[60:340, x : x + 60] = True
+    for y in (110, 320):  # what they hold and stand on almost meets
+        drawn[y : y + 3, 120:188] = drawn[y : y + 3, 192:260] = True
+    ring = np.ones_like(drawn)
+    ring[1:-1, 1:-1] = False
+    filled, _ = close_outlines(drawn, ~drawn, ring & ~drawn)
+    assert not filled.any()
