@@ -361,7 +361,7 @@ def _nearest(found: Sequence[_Paint], rgb: RGB) -> _Paint:
 def _dropped(paint: _Paint, kept: Sequence[_Paint]) -> DroppedColor:
     color = paint.color
     lab = shaded_oklab_from_rgb(np.array(color.rgb, np.uint8))
-    cost = min(_away(ramp_of(one.color), lab) for one in kept)
+    cost = float(min(_away(ramp_of(one.color), lab) for one in kept))
     return DroppedColor(color.rgb, color.share, color.name, cost)
 
 

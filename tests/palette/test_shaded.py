@@ -269,3 +269,13 @@ def test_a_dark_tone_of_a_ramp_is_no_colour_to_keep_besides() -> None:
         pictures, [np.zeros_like(p[..., 0]) for p in pictures], PaletteOptions(keep=(dark,))
     )
     assert len(kept.colors) == len(found.colors)
+
+
+def test_what_a_shaded_palette_leaves_out_is_written_and_read() -> None:
+    pictures, _, _ = _found()
+    contours = [np.zeros_like(picture[..., 0]) for picture in pictures]
+    found = choose_palette(pictures, contours, PaletteOptions(max_colors=2))
+    assert found.dropped
+    assert [one.rgb for one in palette_of(to_json(found), "here").dropped] == [
+        one.rgb for one in found.dropped
+    ]
