@@ -30,11 +30,13 @@ GROUP = 3 * JUST_NOTICEABLE  # in OKLab, from its middle: a lost paint's pixels
 BEYOND_PX, STEP = 3, 2 * JUST_NOTICEABLE  # from an area; in OKLab: less is no edge
 PASSAGE = 0.4  # of an area's border to paint without an edge: more makes it a shade of that
 OF_LINES = 0.25  # of a shrunk pixel that is drawn line: more is no paint
+SAME_LEVELS = 4  # of 255, in every channel: no more apart two colours are alike
 THICK = np.ones((3, 3), dtype=np.uint8)
 MOST = 40  # areas of one character that are looked at
 
 Mask = Bool[np.ndarray, "height width"]
 Places = Float[np.ndarray, "n 3"]
+Colors = UInt8[np.ndarray, "paints 3"]
 
 
 @dataclass(eq=False)
@@ -60,10 +62,14 @@ def add_lost_paints(
         images: these pictures.
         contours: their drawn lines, if known.
     """
-    known = even_oklab_from_rgb(np.array([paint.rgb for paint in paints], dtype=np.uint8))
+    colors = np.array([paint.rgb for paint in paints], dtype=np.uint8)
     lines = contours or [np.zeros(image.shape[:2], dtype=bool) for image in images]
     pairs = zip(images, lines, strict=True)
-    seen = [_seen(image, line, known) for image, line in pairs if image.size]
+    looked_at = [_seen(image, line, colors) for image, line in pairs if image.size]
+    seen = [one for one in looked_at if one is not None]
+    if not seen:
+        return list(paints)
+    known = even_oklab_from_rgb(colors)
     middles = _middles(seen, known)
     if not len(middles):
         return list(paints)
@@ -85,16 +91,33 @@ def add_lost_paints(
 
 
 def _seen(
-    picture: UInt8[np.ndarray, "_ _ 4"], line: Bool[np.ndarray, "_ _"], known: Places
-) -> _Seen:
+    picture: UInt8[np.ndarray, "_ _ 4"], line: Bool[np.ndarray, "_ _"], colors: Colors
+) -> _Seen | None:
+    """Return a drawing with areas that no colour is like; None of a drawing that has none."""
     small = shrunk(picture)
-    opaque = small[..., 3] >= OPAQUE
-    drawn = cv2.resize(line.astype(np.float32), small.shape[1::-1], interpolation=cv2.INTER_AREA)
-    lab = even_oklab_from_rgb(without_grain(np.ascontiguousarray(small[..., :3])))
-    paint = erode(opaque) & (drawn <= OF_LINES)
-    unlike = np.zeros(opaque.shape, dtype=bool)
-    unlike[paint] = _nearest(known, lab[paint])[1] > UNLIKE
-    return _Seen(lab, paint, _thick(unlike))
+    rgb = np.ascontiguousarray(small[..., :3])
+    paint = erode(small[..., 3] >= OPAQUE)
+    if line.any():
+        size = small.shape[1::-1]
+        paint &= cv2.resize(line.astype(np.float32), size, interpolation=cv2.INTER_AREA) <= OF_LINES
+    if not _unlike(rgb, paint, colors).any():  # as most are
+        return None
+    rgb = without_grain(rgb)
+    return _Seen(even_oklab_from_rgb(rgb), paint, _unlike(rgb, paint, colors))
+
+
+def _unlike(
+    rgb: UInt8[np.ndarray, "height width 3"], paint: Mask, colors: Colors
+) -> Bool[np.ndarray, "height width"]:
+    """Return the areas of paint that are unlike every colour."""
+    far = paint.copy()
+    for color in colors.astype(int):  # quick, and no such pixel is unlike
+        like = cv2.inRange(rgb, color - SAME_LEVELS, color + SAME_LEVELS)
+        far &= like == 0
+    far = _thick(far)
+    away = _nearest(even_oklab_from_rgb(colors), even_oklab_from_rgb(rgb[far]))[1]
+    far[far] = away > UNLIKE
+    return _thick(far)
 
 
 def _middles(seen: Sequence[_Seen], known: Places) -> Places:
