@@ -1,10 +1,9 @@
 """Painted sheets, measured: has every paint labels of its own, however it is lit?
 
 Counted are pixels that are one paint's and nothing else's; those without a label count as one more
-label. Index: the adjusted Rand index of labels
-and paints, 1 for the same parts, 0 for chance. Balanced: how far every paint of at least 1.5 %
-shares its pixels with one label alone (intersection over union), the mean. Found: a paint whose
-median colour some tone of the palette comes near.
+label. Index: the adjusted Rand index of labels and paints, 1 for the same parts, 0 for chance.
+Balanced: how far every paint of at least 1.5 % shares its pixels with one label alone (intersection
+over union), the mean. Found: a paint whose median colour some tone of the palette comes near.
 
 Source: L. Hubert and P. Arabie, "Comparing partitions" (1985).
 """
@@ -27,6 +26,7 @@ from toonset.dataset.synthetic.turnaround import Turnaround, make_turnaround
 from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.extract import extract_palette, paint_maps
 from toonset.palette.names import RGB
+from toonset.palette.palette import Palette
 from toonset.palette.pixels.ink_lines import find_contours
 from toonset.palette.pixels.labels import UNLABELLED, nearest_labels
 
@@ -87,12 +87,17 @@ def painted_case(made: Turnaround) -> PaintedCase:
     return PaintedCase(made.mesh.name, images, made.labels, shares)
 
 
-def ours(case: PaintedCase) -> Parted:
+def labelled(case: PaintedCase) -> tuple[Palette, Labels]:
     """Return the palette and labels of `toonset palette`."""
     palette = extract_palette(case.images)
     maps = paint_maps(case.images, find_contours(case.images), palette)
-    colors = [rgb for one in palette.colors for rgb in (one.rgb, *(t.rgb for t in one.tones))]
-    return colors, [one.labels for one in maps]
+    return palette, [one.labels for one in maps]
+
+
+def ours(case: PaintedCase) -> Parted:
+    """Return the same with the palette's tones."""
+    palette, labels = labelled(case)
+    return [c for one in palette.colors for c in (one.rgb, *(t.rgb for t in one.tones))], labels
 
 
 def k_means(case: PaintedCase) -> Parted:

@@ -17,7 +17,7 @@ from bench.cases.bodies import HAIR, SKIN, random_body
 from bench.palette.cases import INK, PaletteCase
 from bench.palette.measure import f1, score
 from bench.palette.methods import LEAST_SHARE, LINE
-from bench.palette.painted import painted_case, score_painted
+from bench.palette.painted import labelled, painted_case, score_painted
 from bench.stability.bodies import recolored, with_eyes
 from bench.stability.sheets import DrawnSheet, as_cut_out
 from bench.stability.trials import Drawer, Kind, Trial, Tried
@@ -112,9 +112,7 @@ def try_labels(draw: Drawer, seed: int, *, paints: bool = False) -> Tried:
 def try_painted(draw: Drawer, seed: int) -> Tried:
     """Return what the index of a painted sheet's labels lacks of 1, in percent."""
     case = painted_case(draw())
-    palette = extract_palette(case.images)
-    maps = paint_maps(case.images, find_contours(case.images), palette)
-    labels = [one.labels for one in maps]
+    palette, labels = labelled(case)
     result = score_painted(case, [color.rgb for color in palette.colors], labels)
     words = "; ".join([f"{len(palette.colors)} colours", *palette.warnings])
     colors = np.concatenate([palette.rgb, np.full((256 - len(palette.rgb), 3), 255, np.uint8)])

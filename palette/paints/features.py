@@ -22,7 +22,7 @@ from toonset.palette.pixels.shadow import apply_shadow
 
 RGB = tuple[int, int, int]
 
-WORN, TOLD = 0.01, 2 * JUST_NOTICEABLE  # of the character; in OKLab, from the palette: shoes, belts
+WORN_SHARE, WORN_UNLIKE = 0.01, 2 * JUST_NOTICEABLE  # of the character; in OKLab: shoes, belts
 SMALL = 0.05  # of the character: more is no feature, whatever share is asked for
 PLACES = 2  # drawings that show it, or patches in a single one
 THICK = 3  # pixels: a patch of a blend is thinner
@@ -45,7 +45,7 @@ def find_features(
     unlike = [
         color.rgb
         for color in small
-        if color.cost >= UNLIKE or (color.share >= WORN and color.cost >= TOLD)
+        if color.cost >= UNLIKE or (color.share >= WORN_SHARE and color.cost >= WORN_UNLIKE)
     ]
     if shadow is not None:
         shades = oklab_from_rgb(apply_shadow(palette.rgb, shadow.factor))

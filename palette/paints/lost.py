@@ -3,8 +3,7 @@
 What is sketched has no flat pixel, shades that touch count as one paint, and cloth whose colour
 lies between two others' counts as their blend. A blend is a border, though, and borders are thin:
 an area with edges is a paint of its own, one that passes into what is beside it is a shade of that.
-Drawings are looked at no taller than `TALL_PX`, without grain, where no line is
-drawn.
+Drawings are looked at no taller than `TALL_PX`, without grain, where no line is drawn.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from toonset.palette.paints.histogram import Histogram
 from toonset.palette.paints.line_color import rounded
 from toonset.palette.pixels.antialias import OPAQUE
 from toonset.palette.pixels.patches import shrunk, without_grain
-from toonset.raster import dilate, erode, nearest
+from toonset.raster import dilate, erode, nearest, sized_parts, wider_than
 
 FAR = 5 * JUST_NOTICEABLE  # in OKLab, from every paint: the middle of a lost one
 GROUP = 3 * JUST_NOTICEABLE  # in OKLab, from its middle: a lost paint's pixels
@@ -31,7 +30,7 @@ BEYOND_PX, STEP = 3, 2 * JUST_NOTICEABLE  # from an area; in OKLab: less is no e
 PASSAGE = 0.4  # of an area's border to paint without an edge: more makes it a shade of that
 OF_LINES = 0.25  # of a shrunk pixel that is drawn line: more is no paint
 SAME_LEVELS = 4  # of 255, in every channel: no more apart two colours are alike
-THICK = np.ones((3, 3), dtype=np.uint8)
+HALF_BLEND_PX = 1  # an area is wider than twice that
 MOST = 40  # areas of one character that are looked at
 
 Mask = Bool[np.ndarray, "height width"]
@@ -40,7 +39,7 @@ Colors = UInt8[np.ndarray, "paints 3"]
 
 
 @dataclass(eq=False)
-class _Seen:
+class _Shrunk:
     """A shrunk drawing in OKLab, where it is paint, and where no known paint is like it."""
 
     lab: Float[np.ndarray, "height width 3"]
@@ -65,7 +64,7 @@ def add_lost_paints(
     colors = np.array([paint.rgb for paint in paints], dtype=np.uint8)
     lines = contours or [np.zeros(image.shape[:2], dtype=bool) for image in images]
     pairs = zip(images, lines, strict=True)
-    looked_at = [_seen(image, line, colors) for image, line in pairs if image.size]
+    looked_at = [_shrunk(image, line, colors) for image, line in pairs if image.size]
     seen = [one for one in looked_at if one is not None]
     if not seen:
         return list(paints)
@@ -74,10 +73,10 @@ def add_lost_paints(
     if not len(middles):
         return list(paints)
     places = even_oklab_from_rgb(histogram.colors)
-    nearest, away = _nearest(np.concatenate([known, middles]), places)
+    owner, away = _nearest_place(np.concatenate([known, middles]), places)
     found = list(paints)
     for number in range(len(known), len(known) + len(middles)):
-        members = np.flatnonzero((nearest == number) & (away <= GROUP))
+        members = np.flatnonzero((owner == number) & (away <= GROUP))
         if not len(members):
             continue
         flat = histogram.flat[members]
@@ -90,9 +89,9 @@ def add_lost_paints(
     return found
 
 
-def _seen(
+def _shrunk(
     picture: UInt8[np.ndarray, "_ _ 4"], line: Bool[np.ndarray, "_ _"], colors: Colors
-) -> _Seen | None:
+) -> _Shrunk | None:
     """Return a drawing with areas that no colour is like; None of a drawing that has none."""
     small = shrunk(picture)
     rgb = np.ascontiguousarray(small[..., :3])
@@ -103,7 +102,7 @@ def _seen(
     if not _unlike(rgb, paint, colors).any():  # as most are
         return None
     rgb = without_grain(rgb)
-    return _Seen(even_oklab_from_rgb(rgb), paint, _unlike(rgb, paint, colors))
+    return _Shrunk(even_oklab_from_rgb(rgb), paint, _unlike(rgb, paint, colors))
 
 
 def _unlike(
@@ -114,13 +113,13 @@ def _unlike(
     for color in colors.astype(int):  # quick, and no such pixel is unlike
         like = cv2.inRange(rgb, color - SAME_LEVELS, color + SAME_LEVELS)
         far &= like == 0
-    far = _thick(far)
-    away = _nearest(even_oklab_from_rgb(colors), even_oklab_from_rgb(rgb[far]))[1]
+    far = wider_than(far, HALF_BLEND_PX)
+    away = _nearest_place(even_oklab_from_rgb(colors), even_oklab_from_rgb(rgb[far]))[1]
     far[far] = away > UNLIKE
-    return _thick(far)
+    return wider_than(far, HALF_BLEND_PX)
 
 
-def _middles(seen: Sequence[_Seen], known: Places) -> Places:
+def _middles(seen: Sequence[_Shrunk], known: Places) -> Places:
     """Return the colours of areas that are far from all paints, the largest area's first."""
     found = []
     for _ in range(MOST):
@@ -135,17 +134,17 @@ def _middles(seen: Sequence[_Seen], known: Places) -> Places:
             if one is seen[number]:
                 own |= area
             one.unlike &= ~own
-            pixels += int(_thick(own).sum())
-            borders.append(_lacks_edge(one, _thick(own)))
+            pixels += int(wider_than(own, HALF_BLEND_PX).sum())
+            borders.append(_lacks_edge(one, wider_than(own, HALF_BLEND_PX)))
         border = np.concatenate(borders)
         passage = border.sum() / max(len(border), 1)
-        away = _nearest(known, middle[None])[1][0]
+        away = _nearest_place(known, middle[None])[1][0]
         if pixels >= LEAST_PX and passage <= PASSAGE and away >= FAR:
             found.append(middle)
     return np.array(found).reshape(-1, 3)
 
 
-def _lacks_edge(one: _Seen, area: Mask) -> Bool[np.ndarray, " border"]:
+def _lacks_edge(one: _Shrunk, area: Mask) -> Bool[np.ndarray, " border"]:
     """Return for each pixel of paint round an area whether no edge parts it from the area."""
     if not area.any():
         return np.zeros(0, dtype=bool)
@@ -157,7 +156,7 @@ def _lacks_edge(one: _Seen, area: Mask) -> Bool[np.ndarray, " border"]:
     return step[paint[ring]] < STEP
 
 
-def _nearest(
+def _nearest_place(
     known: Places, wanted: Places
 ) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, " n"]]:
     """Return which of some places is nearest to each of others, and how far it is."""
@@ -167,14 +166,8 @@ def _nearest(
     return np.asarray(number), np.asarray(away)
 
 
-def _thick(mask: Mask) -> Mask:
-    """Return what of a mask is thicker than a blend."""
-    return np.asarray(cv2.morphologyEx(mask.view(np.uint8), cv2.MORPH_OPEN, THICK)).view(bool)
-
-
 def _largest(mask: Mask) -> Mask:
     """Return the largest connected part of a mask."""
-    count, parts, stats, _ = cv2.connectedComponentsWithStats(mask.view(np.uint8))
-    if count < 2:
-        return np.zeros_like(mask)
-    return np.asarray(parts == 1 + int(stats[1:, cv2.CC_STAT_AREA].argmax()))
+    numbers, areas = sized_parts(mask)
+    areas[0] = 0
+    return np.asarray((numbers == areas.argmax()) & mask)

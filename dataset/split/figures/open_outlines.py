@@ -210,15 +210,9 @@ def _close(drawn: Mask, outside: Mask, seeds: Mask, height: float) -> tuple[Mask
 
 def _bodies(drawn: Mask, outside: Mask, height: float) -> Int[np.ndarray, "rows columns"]:
     """Return the number of every cell's figure, 0 where there is none: what is high and solid."""
-    numbers, areas = sized_parts(drawn | ~outside, connectivity=8)
-    count = len(areas)
-    rows = np.arange(len(drawn))[:, None] * np.ones((1, drawn.shape[1]), dtype=np.int64)
-    top, bottom = np.full(count, len(drawn)), np.zeros(count, dtype=np.int64)
-    np.minimum.at(top, numbers, rows)
-    np.maximum.at(bottom, numbers, rows)
-    solid = (areas >= SOLID * height**2) & (bottom - top >= TALL * height)
-    solid[0] = False
-    return np.where(solid[numbers], numbers, 0)
+    blobs = find_blobs(drawn | ~outside)
+    solid = (blobs.areas >= SOLID * height**2) & (blobs.boxes[:, 3] > TALL * height)
+    return np.where(np.append(False, solid)[blobs.labels], blobs.labels, 0)
 
 
 def _is_line_drawing(drawn: Mask, outside: Mask, height: float) -> bool:
