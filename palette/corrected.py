@@ -74,7 +74,7 @@ def correct_palette(
 ) -> tuple[Palette, list[PaintMap]]:
     """Return a palette as corrected, and labels and tones of its pictures.
 
-    `keep` is not looked at: it says how a palette is found (`PaletteOptions`).
+    `keep` is not looked at: it says how a palette is found (`PaletteRule`).
 
     Args:
         pictures: sRGB with straight alpha.

@@ -21,7 +21,7 @@ from toonset.palette.paints.extract import PICKED, find_palette, pick_palette
 from toonset.palette.paints.features import find_features
 from toonset.palette.paints.grainy_colors import read_drawn_colors
 from toonset.palette.paints.places import add_places
-from toonset.palette.paints.select import PaletteOptions
+from toonset.palette.paints.select import PaletteRule
 from toonset.palette.palette import MAX_COLORS, Palette, PaletteColor, Shadow, Tone
 from toonset.palette.pixels.enlarged import common_grids
 from toonset.palette.pixels.grain import LEAST_LEVELS, noise_levels, remove_grain
@@ -147,7 +147,7 @@ def options_of(
     *,
     contour: bool = True,
     features: bool | None = None,
-) -> PaletteOptions:
+) -> PaletteRule:
     """Return the rule that the arguments of `extract_palette` state.
 
     Raises:
@@ -155,13 +155,13 @@ def options_of(
     """
     kept = _typed("--keep", keep).tolist() if keep else []
     wanted = tuple((r, g, b) for r, g, b in kept)
-    return PaletteOptions(min_share, max_colors, wanted, contour, features)
+    return PaletteRule(min_share, max_colors, wanted, contour, features)
 
 
 def choose_palette(
     pictures: Sequence[Picture],
     contours: Sequence[Map],
-    options: PaletteOptions | None = None,
+    options: PaletteRule | None = None,
     colors: str | None = None,
     printed: Printed | None = None,
 ) -> Palette:
@@ -185,7 +185,7 @@ def choose_palette(
     if grids is not None:
         read = [grid.reduced(picture) for grid, picture in zip(grids, solid, strict=True)]
         lines = [grid.reduced(contour) for grid, contour in zip(grids, contours, strict=True)]
-    found = _chosen(read, lines, options or PaletteOptions(), colors, printed)
+    found = _chosen(read, lines, options or PaletteRule(), colors, printed)
     notes = (*see_through_notes(pictures), *gain_notes(gains))
     if grids is not None:
         notes += (
@@ -214,7 +214,7 @@ def _as_given(found: Palette, given: str) -> Palette:
 def _chosen(
     pictures: Sequence[Picture],
     contours: Sequence[Map],
-    options: PaletteOptions,
+    options: PaletteRule,
     colors: str | None,
     printed: Printed,
 ) -> Palette:
@@ -260,7 +260,7 @@ def _chosen(
 
 def _of_sheet(
     pictures: Sequence[Picture],
-    options: PaletteOptions,
+    options: PaletteRule,
     lines: Sequence[Mask],
     shadow: Shadow | None,
     printed: Printed,
@@ -300,7 +300,7 @@ def _never_in_light(
 
 def _in_light(
     pictures: Sequence[Picture],
-    options: PaletteOptions,
+    options: PaletteRule,
     lines: Sequence[Mask],
     shadow: Shadow | None = None,
 ) -> Palette:

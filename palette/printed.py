@@ -18,7 +18,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 from toonset.errors import PaletteError
 from toonset.palette.colors import JUST_NOTICEABLE, oklab_from_rgb
 from toonset.palette.names import hex_of
-from toonset.palette.paints.select import PaletteOptions
+from toonset.palette.paints.select import PaletteRule
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.antialias import OPAQUE
 
@@ -76,8 +76,8 @@ def occurring(pictures: Sequence[Picture], printed: Sequence[RGB]) -> dict[RGB, 
 
 def with_printed(
     printed: Mapping[RGB, float],
-    options: PaletteOptions,
-    find: Callable[[PaletteOptions], Palette],
+    options: PaletteRule,
+    find: Callable[[PaletteRule], Palette],
     pick: Callable[[UInt8[np.ndarray, "colors 3"]], Palette],
 ) -> Palette:
     """Return the drawings' palette with the printed colours that occur in it.

@@ -21,7 +21,7 @@ from toonset.palette.colors import JUST_NOTICEABLE, shaded_oklab_from_rgb
 from toonset.palette.names import RGB, hex_of
 from toonset.palette.paints.features import ALIKE, LEAST_PX, PLACES, SMALL
 from toonset.palette.paints.ramps import PRICE, UNIT_PX, Moments, join_patches, joined, moments_of
-from toonset.palette.paints.select import KEEP_REACH, PaletteOptions
+from toonset.palette.paints.select import KEEP_REACH, PaletteRule
 from toonset.palette.palette import MAX_COLORS, DroppedColor, Palette, PaletteColor, Tone
 from toonset.palette.pixels.antialias import OPAQUE
 from toonset.palette.pixels.grain import noise_levels
@@ -110,7 +110,7 @@ def is_shaded(pictures: Sequence[Picture]) -> bool:
     return bool(slopes) and float(np.mean(slopes)) >= SHADED**2
 
 
-def find_shaded_palette(pictures: Sequence[Picture], options: PaletteOptions) -> Palette:
+def find_shaded_palette(pictures: Sequence[Picture], options: PaletteRule) -> Palette:
     """Return the palette of shaded drawings: every paint with its ramp.
 
     Kept is what the rule says, and what is smaller but makes the character: paints unlike all
@@ -324,7 +324,7 @@ def _recurrence(
     return sum(count > 0 for count in there), int(sum(there))
 
 
-def _choose(found: Sequence[_Paint], options: PaletteOptions) -> tuple[list[_Paint], list[_Paint]]:
+def _choose(found: Sequence[_Paint], options: PaletteRule) -> tuple[list[_Paint], list[_Paint]]:
     """Return the paints that stay and those left out, largest first."""
     there = sorted((one for one in found if one.color.tones), key=lambda one: -one.color.share)
     kept = [_nearest(there, rgb) for rgb in options.keep]
@@ -365,7 +365,7 @@ def _dropped(paint: _Paint, kept: Sequence[_Paint]) -> DroppedColor:
     return DroppedColor(color.rgb, color.share, color.name, cost)
 
 
-def _rule(options: PaletteOptions) -> str:
+def _rule(options: PaletteRule) -> str:
     words = [
         f"shaded drawings: paints of at least {100 * options.min_share:g} % of the character, each "
         "a ramp from light to dark"

@@ -14,10 +14,10 @@ import numpy as np
 from jaxtyping import UInt8
 
 from toonset.palette.paints.extract import find_palette
-from toonset.palette.paints.select import PaletteOptions
+from toonset.palette.paints.select import PaletteRule
 from toonset.palette.pixels.ink_lines import find_contour
 
-LEAST_SHARE = PaletteOptions().min_share
+LEAST_SHARE = PaletteRule().min_share
 GUESS = 8  # colours, where nobody knows
 LINE = 128  # of 255: covered by half
 

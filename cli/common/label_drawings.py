@@ -10,7 +10,7 @@ from toonset.errors import PaletteError, ToonsetError
 from toonset.palette.corrected import correct_palette
 from toonset.palette.corrections import PaletteCorrections
 from toonset.palette.extract import Map, PaintMap, choose_palette
-from toonset.palette.paints.select import PaletteOptions
+from toonset.palette.paints.select import PaletteRule
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.labels import Space
 from toonset.palette.printed import Printed
@@ -19,7 +19,7 @@ from toonset.palette.printed import Printed
 def label_drawings(
     drawn: Pictures,
     contours: list[Map],
-    options: PaletteOptions,
+    options: PaletteRule,
     given: Given | None = None,
     *,
     colors: str | None = None,

@@ -22,7 +22,7 @@ from toonset.palette.paints.clusters import Paint, find_paints
 from toonset.palette.paints.histogram import Histogram, count_pixels
 from toonset.palette.paints.lost import add_lost_paints
 from toonset.palette.paints.places import patches_of, pixels_of
-from toonset.palette.paints.select import Amount, PaletteOptions, choose, measure, with_wanted
+from toonset.palette.paints.select import Amount, PaletteRule, choose, measure, with_wanted
 from toonset.palette.paints.small_features import near_equal_paints, tiny_paints
 from toonset.palette.paints.warnings import lone_spot_notes, wide_paint_notes
 from toonset.palette.palette import (
@@ -43,7 +43,7 @@ Masks = Sequence[Bool[np.ndarray, "_ _"]]
 
 
 def find_palette(
-    images: Images, options: PaletteOptions | None = None, contours: Masks | None = None
+    images: Images, options: PaletteRule | None = None, contours: Masks | None = None
 ) -> Palette:
     """Return the colours of a character, the most frequent first.
 
@@ -63,7 +63,7 @@ def find_palette(
     Raises:
         PaletteError: no picture, no opaque pixel in them, or nothing found near a colour to keep.
     """
-    options = options or PaletteOptions()
+    options = options or PaletteRule()
     histogram = _histogram(images)
     found = find_paints(histogram)
     near = near_equal_paints(histogram, found.paints, max(options.min_share, LEAST_LISTED))
@@ -99,7 +99,7 @@ def pick_palette(
     """
     histogram = _histogram(images)
     paints = _picked_paints(histogram, rgb)
-    amounts, ink = measure(paints, paint_areas(histogram, paints, contours), PaletteOptions())
+    amounts, ink = measure(paints, paint_areas(histogram, paints, contours), PaletteRule())
     colors = tuple(PaletteColor(a.paint.rgb, a.share, name_of(a.paint.rgb)) for a in amounts)
     unused = [hex_of(color.rgb) for color in colors if not color.share]
     warnings = (f"no pixel is nearest to {', '.join(unused)}",) if unused else ()
@@ -152,7 +152,7 @@ def _histogram(images: Images) -> Histogram:
     return histogram
 
 
-def _rule(options: PaletteOptions, contour: ContourColor | None) -> str:
+def _rule(options: PaletteRule, contour: ContourColor | None) -> str:
     """Return the rule in words; shares that it names are of the same pixels as the colours'."""
     least = 100 * options.min_share
     words = [f"at least {least:g} % of the character's pixels"]

@@ -24,7 +24,7 @@ RGB = tuple[int, int, int]
 
 
 @dataclass(frozen=True)
-class PaletteOptions:
+class PaletteRule:
     """Options of choosing colours.
 
     Attributes:
@@ -106,7 +106,7 @@ def with_wanted(
 
 
 def measure(
-    paints: Sequence[Paint], areas: Areas, options: PaletteOptions
+    paints: Sequence[Paint], areas: Areas, options: PaletteRule
 ) -> tuple[list[Amount], int | None]:
     """Return every paint's amount, and which paint is the lines' ink (None without lines).
 
@@ -129,7 +129,7 @@ def measure(
 
 
 def choose(
-    amounts: Sequence[Amount], options: PaletteOptions
+    amounts: Sequence[Amount], options: PaletteRule
 ) -> tuple[list[Amount], list[Amount], tuple[str, ...]]:
     """Return the amounts that stay and those left out, largest share first, and warnings.
 
@@ -153,7 +153,7 @@ def choose(
     return kept, left, (warning,)
 
 
-def _keep_notes(wanted: Sequence[Amount], options: PaletteOptions) -> tuple[str, ...]:
+def _keep_notes(wanted: Sequence[Amount], options: PaletteRule) -> tuple[str, ...]:
     """Return what was kept for colours that are not in the pictures as typed."""
     return tuple(
         f"--keep: {hex_of(rgb)} itself was not found; kept the nearest, {hex_of(one.paint.rgb)}"

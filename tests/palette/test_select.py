@@ -10,7 +10,7 @@ from toonset.errors import PaletteError
 from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.paints.extract import find_palette, pick_palette
 from toonset.palette.paints.places import add_places
-from toonset.palette.paints.select import PaletteOptions
+from toonset.palette.paints.select import PaletteRule
 from toonset.palette.palette import Palette, PaletteColor, Place
 from toonset.palette.pixels.labels import nearest_colors
 
@@ -26,7 +26,7 @@ def test_the_five_percent_rule_and_what_it_costs() -> None:
     lab = oklab_from_rgb(np.array([blue, red, green], dtype=np.uint8))
     nearest = nearest_colors(np.array([blue], np.uint8), np.array([red, green], np.uint8))[0]
     assert dropped.cost == pytest.approx(float(np.linalg.norm(lab[0] - lab[1 + nearest])))
-    assert len(find_palette([picture], PaletteOptions(min_share=0.03)).colors) == 3
+    assert len(find_palette([picture], PaletteRule(min_share=0.03)).colors) == 3
 
 
 def test_all_pictures_count_together() -> None:
@@ -37,7 +37,7 @@ def test_all_pictures_count_together() -> None:
 
 def test_if_nothing_reaches_the_share_the_largest_is_kept_and_said() -> None:
     picture = block(((200, 30, 40), 40), ((20, 60, 180), 35), ((30, 160, 60), 25))
-    palette = find_palette([picture], PaletteOptions(min_share=0.5))
+    palette = find_palette([picture], PaletteRule(min_share=0.5))
     assert [color.rgb for color in palette.colors] == [(200, 30, 40)]
     assert palette.warnings == (
         "no colour reaches 50.0% of the pixels; the largest, with 40.0%, was kept alone: lower "
@@ -63,8 +63,8 @@ BLACK = PaletteColor((0, 0, 0), 0.0, "black")
     [
         (lambda: find_palette([]), "no picture given"),
         (lambda: find_palette([np.zeros((9, 9, 4), dtype=np.uint8)]), "no opaque pixel"),
-        (lambda: PaletteOptions(min_share=5.0), "--min-share: 5 is no share; give 0 to 1"),
-        (lambda: PaletteOptions(max_colors=0), "--max-colors: 0 colours; give 1 to 255"),
+        (lambda: PaletteRule(min_share=5.0), "--min-share: 5 is no share; give 0 to 1"),
+        (lambda: PaletteRule(max_colors=0), "--max-colors: 0 colours; give 1 to 255"),
         (lambda: Palette((), "none"), "0 colours; 1 to 255 are needed"),
         (lambda: Palette((BLACK,) * 256, "many"), "256 colours; 1 to 255 are needed"),
     ],
@@ -86,27 +86,27 @@ def test_small_colours_are_kept_on_request() -> None:
     red, blue, green = (200, 30, 40), (20, 60, 180), (30, 160, 60)
     picture = block((red, 95), (blue, 3), (green, 2))
     assert as_set(find_palette([picture])) == {red}
-    options = PaletteOptions(keep=((24, 64, 178),))  # near the blue that is there
+    options = PaletteRule(keep=((24, 64, 178),))  # near the blue that is there
     assert as_set(find_palette([picture], options)) == {red, blue}
     with pytest.raises(
         PaletteError, match="--keep: #ffff00: no such colour was found; the nearest is"
     ):
-        find_palette([picture], PaletteOptions(keep=((255, 255, 0),)))
-    all_three = PaletteOptions(min_share=0.0, max_colors=2, keep=(green,))
+        find_palette([picture], PaletteRule(keep=((255, 255, 0),)))
+    all_three = PaletteRule(min_share=0.0, max_colors=2, keep=(green,))
     assert as_set(find_palette([picture], all_three)) == {red, green}
     with pytest.raises(PaletteError, match="raise --max-colors"):
-        PaletteOptions(max_colors=1, keep=(red, blue))
+        PaletteRule(max_colors=1, keep=(red, blue))
 
 
 def test_a_colour_kept_in_the_place_of_another_is_said() -> None:
     red, blue = (200, 30, 40), (20, 60, 180)
     small = block((red, 97), (blue, 3))
     near = ((40, 85, 190),)  # 0.07 away in OKLab
-    (note,) = find_palette([small], PaletteOptions(keep=near)).warnings
+    (note,) = find_palette([small], PaletteRule(keep=near)).warnings
     assert note == "--keep: #2855be itself was not found; kept the nearest, #143cb4"
-    (note,) = find_palette([block((red, 60), (blue, 40))], PaletteOptions(keep=near)).warnings
+    (note,) = find_palette([block((red, 60), (blue, 40))], PaletteRule(keep=near)).warnings
     assert note.endswith("#143cb4, which the rule keeps anyway")
-    assert find_palette([small], PaletteOptions(keep=(blue,))).warnings == ()
+    assert find_palette([small], PaletteRule(keep=(blue,))).warnings == ()
 
 
 def test_a_found_palette_picked_by_hand_has_the_same_shares() -> None:
@@ -142,7 +142,7 @@ def test_the_rule_names_the_least_share_of_all_pixels() -> None:
     assert "here 4.8 % of all its pixels" in palette.rule  # 96 % are no lines
     assert min(color.share for color in palette.colors) >= 0.048
     assert "of the character's pixels" in find_palette([rgba]).rule
-    assert "at most 2 colours" in find_palette([rgba], PaletteOptions(max_colors=2)).rule
+    assert "at most 2 colours" in find_palette([rgba], PaletteRule(max_colors=2)).rule
 
 
 def lined(black_cloth: int) -> tuple[np.ndarray, np.ndarray]:
@@ -170,12 +170,12 @@ def test_lines_count_to_their_ink_and_do_not_push_others_out() -> None:
 @pytest.mark.parametrize(("black_cloth", "stays"), [(0, False), (10, True)])
 def test_without_its_lines_black_stays_only_as_cloth(black_cloth: int, stays: bool) -> None:
     rgba, line = lined(black_cloth)
-    palette = find_palette([rgba], PaletteOptions(contour=False), [line])
+    palette = find_palette([rgba], PaletteRule(contour=False), [line])
     assert ((0, 0, 0) in as_set(palette)) == stays
     assert palette.contour is not None
     assert palette.contour.cloth == pytest.approx(black_cloth / (50 + black_cloth))
     if not stays:
-        kept = PaletteOptions(contour=False, keep=((0, 0, 0),))
+        kept = PaletteRule(contour=False, keep=((0, 0, 0),))
         assert (0, 0, 0) in as_set(find_palette([rgba], kept, [line]))
 
 

@@ -12,7 +12,7 @@ from toonset.palette.extract import choose_palette, extract_palette, paint_maps
 from toonset.palette.formats.json import palette_of, to_json
 from toonset.palette.names import hex_of
 from toonset.palette.paints.ramps import join_patches, moments_of
-from toonset.palette.paints.select import PaletteOptions
+from toonset.palette.paints.select import PaletteRule
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.patches import Patches, find_patches, smooth_lab
 from toonset.palette.pixels.ramp_labels import Ramp, savings
@@ -120,19 +120,19 @@ def test_a_ramp_is_one_patch_and_an_edge_parts_two() -> None:
 def test_left_out_paints_are_listed_and_come_back() -> None:
     pictures, _, _ = _found()
     lines = [np.zeros(one.shape[:2], np.uint8) for one in pictures]
-    plain = choose_palette(pictures, lines, PaletteOptions(min_share=0.2, features=False))
+    plain = choose_palette(pictures, lines, PaletteRule(min_share=0.2, features=False))
     belt = min(plain.dropped, key=lambda one: np.abs(np.array(one.rgb) - BELT).sum())
     assert belt.share < 0.2
     assert belt.rgb not in [color.rgb for color in plain.colors]
     for options in (
-        PaletteOptions(min_share=0.2, features=False, keep=(belt.rgb,)),
-        PaletteOptions(min_share=0.01, features=False),
+        PaletteRule(min_share=0.2, features=False, keep=(belt.rgb,)),
+        PaletteRule(min_share=0.01, features=False),
     ):
         kept = choose_palette(pictures, lines, options)
         away = [np.abs(np.array(color.rgb) - belt.rgb).max() for color in kept.colors]
         assert min(away) <= 6
     with pytest.raises(PaletteError, match="no such colour"):
-        choose_palette(pictures, lines, PaletteOptions(keep=((0, 255, 0),)))
+        choose_palette(pictures, lines, PaletteRule(keep=((0, 255, 0),)))
 
 
 def test_colours_picked_by_hand_get_ramps() -> None:
@@ -218,7 +218,7 @@ def test_thin_stripes_are_one_paint_in_whatever_light() -> None:
         for row in (90, 100, 110, 145, 155, 165, 175, 185):
             rgba[row, 14:76, :3] = np.clip(stripe * rng.uniform(0.3, 1.2), 0, 255)
         pictures.append(rgba)
-    found = find_shaded_palette(pictures, PaletteOptions(min_share=0.001))
+    found = find_shaded_palette(pictures, PaletteRule(min_share=0.001))
     assert len(found.colors) == len(PAINTS) + 1
     away = oklab_from_rgb(found.rgb) - oklab_from_rgb(stripe.astype(np.uint8))
     assert np.linalg.norm(away[:, 1:], axis=1).min() < 0.03
@@ -266,7 +266,7 @@ def test_a_dark_tone_of_a_ramp_is_no_colour_to_keep_besides() -> None:
     pictures, _, found = _found()
     dark = found.colors[0].tones[-1].rgb
     kept = choose_palette(
-        pictures, [np.zeros_like(p[..., 0]) for p in pictures], PaletteOptions(keep=(dark,))
+        pictures, [np.zeros_like(p[..., 0]) for p in pictures], PaletteRule(keep=(dark,))
     )
     assert len(kept.colors) == len(found.colors)
 
@@ -274,7 +274,7 @@ def test_a_dark_tone_of_a_ramp_is_no_colour_to_keep_besides() -> None:
 def test_what_a_shaded_palette_leaves_out_is_written_and_read() -> None:
     pictures, _, _ = _found()
     contours = [np.zeros_like(picture[..., 0]) for picture in pictures]
-    found = choose_palette(pictures, contours, PaletteOptions(max_colors=2))
+    found = choose_palette(pictures, contours, PaletteRule(max_colors=2))
     assert found.dropped
     assert [one.rgb for one in palette_of(to_json(found), "here").dropped] == [
         one.rgb for one in found.dropped

@@ -13,7 +13,7 @@ from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.paints.extract import LEAST_LISTED, find_palette
 from toonset.palette.paints.histogram import count_pixels
 from toonset.palette.paints.places import patches_of, pixels_of
-from toonset.palette.paints.select import PaletteOptions
+from toonset.palette.paints.select import PaletteRule
 from toonset.palette.palette import Palette, Place
 from toonset.palette.pixels.labels import label_pixels
 
@@ -66,7 +66,7 @@ def test_a_near_equal_colour_is_listed_with_what_it_looks_like(order: tuple) -> 
 
 def test_a_near_equal_colour_can_be_kept() -> None:
     picture = block((SKIN, 60), (HAIR, 30), (SHIRT, 40))
-    palette = find_palette([picture], PaletteOptions(keep=(HAIR,)))
+    palette = find_palette([picture], PaletteRule(keep=(HAIR,)))
     assert as_set(palette) == {SKIN, HAIR, SHIRT}
     assert palette.dropped == palette.warnings == ()
     assert {c.rgb: round(130 * c.share) for c in palette.colors} == {SKIN: 60, SHIRT: 40, HAIR: 30}
@@ -77,7 +77,7 @@ def test_a_near_equal_colour_can_be_kept() -> None:
 def test_a_near_equal_colour_under_the_rule_is_not_listed() -> None:
     picture = block((SKIN, 60), (HAIR, 3), (SHIRT, 40))
     assert listed(find_palette([picture])) == []
-    assert listed(find_palette([picture], PaletteOptions(min_share=0.02))) == [HAIR]
+    assert listed(find_palette([picture], PaletteRule(min_share=0.02))) == [HAIR]
 
 
 def test_near_equal_colours_of_a_jpeg_are_listed() -> None:
@@ -115,7 +115,7 @@ def test_tiny_features_of_an_own_colour_are_listed_and_can_be_kept() -> None:
     (eye,) = palette.dropped
     assert (eye.rgb, eye.place) == (EYE, Place(0, (50, 10, 3, 3)))
     assert eye.share == pytest.approx(18 / 10400)
-    kept = find_palette([picture], PaletteOptions(keep=(EYE,)))
+    kept = find_palette([picture], PaletteRule(keep=(EYE,)))
     assert as_set(kept) == {SKIN, SHIRT, EYE}
     assert kept.dropped == kept.warnings == ()
 
