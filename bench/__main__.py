@@ -19,6 +19,7 @@ from bench.commands.measure import WRITTEN as PICTURES
 from bench.commands.measure import measure
 from bench.commands.results import REPORT, result_files
 from bench.commands.results import WRITTEN as RESULTS
+from toonset.cli.common.flags import command_of
 from toonset.cli.common.help import Verb
 from toonset.cli.common.output import (
     OUTPUT_PANEL,
@@ -41,6 +42,7 @@ app = typer.Typer(
 
 
 @app.command(cls=Verb)
+@command_of
 def bench(
     subject: Annotated[Subject | None, typer.Argument(help="What to measure.")] = None,
     cases: Annotated[

@@ -19,7 +19,7 @@ from toonset.dataset.split_folder.corrected import Given
 from toonset.dataset.split_folder.corrections import PlacedCamera, PointPair
 from toonset.dataset.split_folder.view_labels import parse_labels
 from toonset.errors import CameraError, UsageError
-from toonset.symmetric import SYMMETRIC, Symmetric
+from toonset.options import SYMMETRIC, Symmetric
 from toonset.view import View
 
 SQUARE = 1e-3  # a pixel may be this much higher than wide: rounding of a file

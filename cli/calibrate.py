@@ -42,7 +42,7 @@ from toonset.cli.common.output import (
     VerboseFlag,
     counted,
 )
-from toonset.symmetric import Symmetric
+from toonset.options import Symmetric
 
 if TYPE_CHECKING:
     from toonset.calib.hints import Hints

@@ -22,6 +22,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from toonset import __version__, lock
+from toonset.cli.common.flags import command_of
 from toonset.cli.common.help import Verb, Verbs, complete_at_first_tab
 from toonset.cli.common.output import lead_nowhere, say
 from toonset.cli.common.refusals import MORE_SPACE, refusal
@@ -80,7 +81,7 @@ complete_at_first_tab()
 for _verb in VERBS:
     _name = f"{_verb}_" if keyword.iskeyword(_verb) else _verb  # of the function
     _module = importlib.import_module(f"toonset.cli.{MODULES.get(_verb, _name)}")
-    app.command(_verb, cls=Verb)(getattr(_module, _name))
+    app.command(_verb, cls=Verb)(command_of(getattr(_module, _name)))
 
 
 def main() -> None:

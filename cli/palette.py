@@ -20,8 +20,8 @@ from toonset.cli.common.output import (
     VerboseFlag,
     counted,
 )
-from toonset.errors import UsageError
 from toonset.lock import FOLDERS
+from toonset.palette.options import CHOICE_PANEL, PaletteOptions
 from toonset.write import check_output
 
 if TYPE_CHECKING:
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
 WRITTEN = ("palette.json", "palette.gpl", "palette.ase", "palette.hex", "palette.png")
 BUNDLE, OUT, RECOLORED = Path("bundle"), Path("palette"), Path("recolored")
-CHOICE_PANEL = "Choice of colours"
 
 
 def palette(
@@ -41,46 +40,7 @@ def palette(
             help="A bundle (default: ./bundle), a folder that `split` wrote, folders, images.",
         ),
     ] = None,
-    colors: Annotated[
-        str | None,
-        typer.Option(
-            "--colors",
-            help="Your own: '#aabbcc,#123,white', or a palette file.",
-            rich_help_panel=CHOICE_PANEL,
-        ),
-    ] = None,
-    swatches: Annotated[
-        bool | None,
-        typer.Option(
-            "--swatches/--no-swatches",
-            help="The palette that the sheet prints, as it is (default: where it fits the paint).",
-            rich_help_panel=CHOICE_PANEL,
-            show_default=False,
-        ),
-    ] = None,
-    min_share: Annotated[
-        float,
-        typer.Option(
-            "--min-share",
-            help="Least share of the character's pixels.",
-            rich_help_panel=CHOICE_PANEL,
-        ),
-    ] = 0.05,
-    max_colors: Annotated[
-        int,
-        typer.Option(
-            "--max-colors", help="At most so many, the largest.", rich_help_panel=CHOICE_PANEL
-        ),
-    ] = 255,
-    keep: Annotated[
-        str,
-        typer.Option(
-            "--keep",
-            metavar="COLOURS",
-            help="Keep these of the left-out colours: '#aabbcc,...'.",
-            rich_help_panel=CHOICE_PANEL,
-        ),
-    ] = "",
+    options: PaletteOptions = PaletteOptions(),
     corrections: Annotated[
         Path | None,
         typer.Option(
@@ -88,23 +48,6 @@ def palette(
             metavar="FILE",
             help="What a person corrected: the corrections.json of `toonset edit`, or by hand.",
             rich_help_panel=CHOICE_PANEL,
-        ),
-    ] = None,
-    contour: Annotated[
-        bool,
-        typer.Option(
-            "--contour/--no-contour",
-            help="Count drawn lines to their colour; without, only what is painted with it.",
-            rich_help_panel=CHOICE_PANEL,
-        ),
-    ] = True,
-    features: Annotated[
-        bool | None,
-        typer.Option(
-            "--features/--no-features",
-            help="Keep eyes, mouths, buttons under that share (default: keep).",
-            rich_help_panel=CHOICE_PANEL,
-            show_default=False,
         ),
     ] = None,
     space: Annotated[
@@ -135,7 +78,7 @@ def palette(
     from toonset.dataset.bundle.palette_files import check_map_folders, write_labelled
     from toonset.dataset.split_folder.corrected import Given
     from toonset.dataset.split_folder.pictures import bundle_of, check_pictures, load_pictures
-    from toonset.palette.extract import options_of
+    from toonset.palette.extract import rule_of
     from toonset.palette.pixels.ink_lines import find_contours
     from toonset.write import new_folder
 
@@ -143,8 +86,7 @@ def palette(
     places = inputs or [BUNDLE]
     given = None if corrections is None else Given.of(corrections)
     if given is not None:
-        given.check_beside(keep=keep)
-        keep = ",".join(given.content.palette.keep) or keep
+        given.check_beside(keep=options.keep)
     check_pictures(places)
     bundle = bundle_of(places)
     target = out or bundle or OUT
@@ -154,16 +96,12 @@ def palette(
     else:
         lock.claim(lock.set_of(target / WRITTEN[0]), target)
         check_map_folders(target)
-    if swatches is not None and colors is not None:
-        raise UsageError("--colors is the whole palette; leave --swatches away")
-    options = options_of(min_share, max_colors, keep, contour=contour, features=features)
+    rule_of(options)  # colours that cannot be understood are refused before pictures are read
     drawn = load_pictures(places)
     for note in drawn.notes:
         printer.say(note)
     contours = find_contours(drawn.pictures)
-    found, maps, notes = label_drawings(
-        drawn, contours, options, given, colors=colors, swatches=swatches, space=space
-    )
+    found, maps, notes = label_drawings(drawn, contours, options, given, space)
     for note in notes:
         printer.say(note)
     with nullcontext(target) if target == bundle else new_folder(target, force=force) as folder:
@@ -237,7 +175,6 @@ def _painted(places: list[Path], printer: Printer) -> tuple[Palette, list[Painte
     from toonset.dataset.split_folder.pictures import bundle_of, load_pictures
     from toonset.palette.extract import choose_palette, paint_maps
     from toonset.palette.pixels.ink_lines import find_contours
-    from toonset.palette.printed import Printed
 
     bundle = bundle_of(places)
     if bundle is not None:
@@ -246,7 +183,7 @@ def _painted(places: list[Path], printer: Printer) -> tuple[Palette, list[Painte
     for note in drawn.notes:
         printer.say(note)
     contours = find_contours(drawn.pictures)
-    found = choose_palette(drawn.pictures, contours, printed=Printed(drawn.swatches))
+    found = choose_palette(drawn.pictures, contours, swatches=drawn.swatches)
     maps = paint_maps(drawn.pictures, contours, found)
     parts = zip(drawn.names, drawn.pictures, maps, contours, strict=True)
     return found, [Painted(*part) for part in parts]

@@ -19,7 +19,7 @@ from toonset.cli.common.output import (
 from toonset.cli.common.train_run import Request, run
 from toonset.nerf.options import MOST_STEPS, DeviceName, FieldName, PresetName
 from toonset.nerf.options import preset as preset_options
-from toonset.symmetric import Symmetric
+from toonset.options import Symmetric
 
 WHILE_PANEL = "While it runs"
 MOST_BUDGET_S = 1e9

@@ -17,7 +17,7 @@ HERE = Path(__file__).parent
 out = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
 
 views = ts.split_sheet(HERE / "sheet.png").views
-palette = ts.extract_palette(views, min_share=0.05)
+palette = ts.extract_palette(views, ts.PaletteOptions(min_share=0.05))
 for color in palette.colors:
     print("#{:02x}{:02x}{:02x}".format(*color.rgb), f"{color.share:6.1%}  {color.name}")
 for color in palette.dropped:

@@ -7,7 +7,7 @@ from enum import StrEnum
 from typing import Any, Literal, get_args
 
 from toonset.errors import UsageError
-from toonset.symmetric import SYMMETRIC, Symmetric
+from toonset.options import SYMMETRIC, Symmetric
 
 
 class Layer(StrEnum):

@@ -17,12 +17,14 @@ from toonset.palette.formats.registry import (
     parse_named_colors,
 )
 from toonset.palette.named import with_names
+from toonset.palette.names import RGB
+from toonset.palette.options import PaletteOptions
 from toonset.palette.paints.extract import PICKED, find_palette, pick_palette
 from toonset.palette.paints.features import find_features
 from toonset.palette.paints.grainy_colors import read_drawn_colors
 from toonset.palette.paints.places import add_places
 from toonset.palette.paints.select import PaletteRule
-from toonset.palette.palette import MAX_COLORS, Palette, PaletteColor, Shadow, Tone
+from toonset.palette.palette import Palette, PaletteColor, Shadow, Tone
 from toonset.palette.pixels.enlarged import common_grids
 from toonset.palette.pixels.grain import LEAST_LEVELS, noise_levels, remove_grain
 from toonset.palette.pixels.ink_lines import find_contours
@@ -66,42 +68,25 @@ class PaintMap:
 
 
 def extract_palette(
-    views: Sequence[View | Picture],
-    *,
-    min_share: float = 0.05,
-    max_colors: int = MAX_COLORS,
-    keep: str = "",
-    contour: bool = True,
-    features: bool | None = None,
-    colors: str | None = None,
-    swatches: bool | None = None,
+    views: Sequence[View | Picture], options: PaletteOptions = PaletteOptions()
 ) -> Palette:
     """Return the colours that make up at least 5 % of a character, the most frequent first.
 
     Args:
         views: the drawings, or RGBA pictures; one palette for all.
-        min_share: least share of the character's pixels, 0 to 1.
-        max_colors: at most so many, the largest.
-        keep: colours to keep however small they are: "#aabbcc,...".
-        contour: count drawn lines to their colour; without, only what is painted with it.
-        features: keep eyes, mouths and buttons under that share, too; None: as True.
-        colors: a palette of your own instead: "#aabbcc,#123,white", or a palette file, whose title
-            and names are kept. Where the file has tones in shadow, a sheet's shadow is taken off;
-            else name both tones.
-        swatches: take the palette that the views' sheets print as the whole palette, as it is;
-            None: keep its colours that the drawings are painted in, and add what else there is;
-            False: do not look at it.
+        options: how they are chosen. Of `colors`, the title and names of a palette file are kept;
+            where it has tones in shadow, a sheet's shadow is taken off, else name both tones.
+            `swatches` takes the palette that the views' sheets print as the whole palette; None
+            keeps its colours that the drawings are painted in, and adds what else there is; False
+            does not look at it.
 
     Raises:
-        ToonsetError: no opaque pixel, a colour that cannot be understood or found, or arguments
-            that contradict each other.
+        ToonsetError: no opaque pixel, or a colour that cannot be understood or found.
     """
     pictures = [picture_of(view) for view in views]
     contours = find_contours(pictures)
-    options = options_of(min_share, max_colors, keep, contour=contour, features=features)
     own = [rgb for view in views if isinstance(view, View) for rgb in view.swatches]
-    printed = Printed(tuple(dict.fromkeys(own)), swatches)
-    return choose_palette(pictures, contours, options, colors, printed)
+    return choose_palette(pictures, contours, options, tuple(dict.fromkeys(own)))
 
 
 def label_image(view: View | Picture, palette: Palette, *, space: Space = "rgb") -> Map:
@@ -140,30 +125,24 @@ def picture_of(view: View | Picture) -> Picture:
     return rgba
 
 
-def options_of(
-    min_share: float,
-    max_colors: int,
-    keep: str,
-    *,
-    contour: bool = True,
-    features: bool | None = None,
-) -> PaletteRule:
-    """Return the rule that the arguments of `extract_palette` state.
+def rule_of(options: PaletteOptions) -> PaletteRule:
+    """Return the rule that options state.
 
     Raises:
-        PaletteError: out of range, or a colour that cannot be understood.
+        PaletteError: a colour to keep that cannot be understood, or too many of them.
     """
-    kept = _typed("--keep", keep).tolist() if keep else []
+    kept = _typed("--keep", options.keep).tolist() if options.keep else []
     wanted = tuple((r, g, b) for r, g, b in kept)
-    return PaletteRule(min_share, max_colors, wanted, contour, features)
+    return PaletteRule(
+        options.min_share, options.max_colors, wanted, options.contour, options.features
+    )
 
 
 def choose_palette(
     pictures: Sequence[Picture],
     contours: Sequence[Map],
-    options: PaletteRule | None = None,
-    colors: str | None = None,
-    printed: Printed | None = None,
+    options: PaletteOptions = PaletteOptions(),
+    swatches: Sequence[RGB] = (),
 ) -> Palette:
     """Return the palette of pictures whose drawn lines are known; see `extract_palette`.
 
@@ -171,10 +150,10 @@ def choose_palette(
         pictures: sRGB with straight alpha.
         contours: how far drawn lines cover their pixels, of 255.
         options: of the choice.
-        colors: a palette of the user's own.
-        printed: the palette that the sheets print, and whether it is to be used.
+        swatches: the palette that the sheets print.
     """
-    printed = printed or Printed()
+    rule, colors = rule_of(options), options.colors
+    printed = Printed(tuple(swatches), options.swatches)
     if printed.use and colors is None:
         colors = printed.as_colors()
     solid = [opaque_inside(picture) for picture in pictures]
@@ -185,7 +164,7 @@ def choose_palette(
     if grids is not None:
         read = [grid.reduced(picture) for grid, picture in zip(grids, solid, strict=True)]
         lines = [grid.reduced(contour) for grid, contour in zip(grids, contours, strict=True)]
-    found = _chosen(read, lines, options or PaletteRule(), colors, printed)
+    found = _chosen(read, lines, rule, colors, printed)
     notes = (*see_through_notes(pictures), *gain_notes(gains))
     if grids is not None:
         notes += (
@@ -218,8 +197,6 @@ def _chosen(
     colors: str | None,
     printed: Printed,
 ) -> Palette:
-    if colors is not None and options.keep:
-        raise UsageError("--colors is the whole palette; leave --keep away")
     lines = [contour >= LINE for contour in contours]
     picked = None if colors is None else _typed("--colors", colors)
     smooth = remove_grain(pictures)

@@ -16,8 +16,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer
 
 from toonset.errors import PaletteError
 from toonset.palette.names import RGB, clean_name, hex_of, one_line, rgb_of_hex
-
-MAX_COLORS = 255  # a label is one byte, and 255 means unlabelled
+from toonset.palette.options import MAX_COLORS
 
 
 def _of_hex(text: object) -> RGB:

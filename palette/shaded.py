@@ -19,10 +19,11 @@ from toonset.errors import PaletteError
 from toonset.palette.color_names import name_of
 from toonset.palette.colors import JUST_NOTICEABLE, shaded_oklab_from_rgb
 from toonset.palette.names import RGB, hex_of
+from toonset.palette.options import MAX_COLORS
 from toonset.palette.paints.features import ALIKE, LEAST_PX, PLACES, SMALL
 from toonset.palette.paints.ramps import PRICE, UNIT_PX, Moments, join_patches, joined, moments_of
 from toonset.palette.paints.select import KEEP_REACH, PaletteRule
-from toonset.palette.palette import MAX_COLORS, DroppedColor, Palette, PaletteColor, Tone
+from toonset.palette.palette import DroppedColor, Palette, PaletteColor, Tone
 from toonset.palette.pixels.antialias import OPAQUE
 from toonset.palette.pixels.grain import noise_levels
 from toonset.palette.pixels.patches import (

@@ -257,7 +257,7 @@ MISTAKES = [
         ("calibrate", "sheet.png", "--lock", "yaw"),
     ),
     (
-        lambda d: ts.extract_palette([ts.load_picture(d / "sheet.png")], min_share=7),
+        lambda d: ts.extract_palette([], ts.PaletteOptions(min_share=7)),
         ("palette", "sheet.png", "--min-share", "7"),
     ),
     (lambda d: ts.read_bundle(d), ("train", ".")),

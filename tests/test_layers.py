@@ -18,7 +18,7 @@ OUTSIDE = ("bench", "tests", "examples")  # of the wheel: no stage imports them
 # folder. Rooms of one floor do not see each other, so there is no circle.
 FLOORS: dict[str, tuple[str, ...]] = {
     "palette": (
-        "@colors",
+        "@colors @options",
         "@color_names",
         "@names",
         "@palette",

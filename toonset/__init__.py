@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from toonset.dataset.bundle.scene import Scene as Scene
     from toonset.dataset.images.picture import load_rgba
     from toonset.dataset.mesh.load import load_mesh as load_mesh
-    from toonset.dataset.split_folder.load import Sheet as Sheet
     from toonset.dataset.split_folder.load import split_sheet as split_sheet
     from toonset.dataset.view_dataset import ViewDataset as ViewDataset
     from toonset.errors import ToonsetError as ToonsetError
@@ -49,6 +48,7 @@ if TYPE_CHECKING:
     from toonset.nerf.training import train as train
     from toonset.palette.extract import extract_palette as extract_palette
     from toonset.palette.extract import label_image as label_image
+    from toonset.palette.options import PaletteOptions as PaletteOptions
     from toonset.palette.palette import Palette as Palette
     from toonset.projection import project as project
     from toonset.view import View as View
@@ -65,7 +65,7 @@ _PLACES = {  # module -> its public names; "name=there" where it is called other
     "dataset.bundle.scene": "Scene",
     "dataset.images.picture": "load_picture=load_rgba",
     "dataset.mesh.load": "load_mesh",
-    "dataset.split_folder.load": "Sheet split_sheet",
+    "dataset.split_folder.load": "split_sheet",
     "dataset.view_dataset": "ViewDataset",
     "errors": "ToonsetError",
     "mesh": "Mesh",
@@ -78,6 +78,7 @@ _PLACES = {  # module -> its public names; "name=there" where it is called other
     "nerf.surface.surface": "surface_of",
     "nerf.training": "Run train",
     "palette.extract": "extract_palette label_image",
+    "palette.options": "PaletteOptions",
     "palette.palette": "Palette",
     "projection": "project",
     "view": "View",

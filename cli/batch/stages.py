@@ -12,7 +12,7 @@ import json
 import pkgutil
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from enum import Enum
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -21,6 +21,7 @@ from typing import Any
 
 import typer
 
+from toonset.cli.common.flags import arguments_of, each_of, verb_of
 from toonset.cli.common.refusals import refusal
 from toonset.errors import ToonsetError, UsageError, one_line
 
@@ -160,12 +161,12 @@ def parse(stage: str, words: Sequence[str], where: str) -> dict[str, Any]:
     try:
         with _silent_help(command):
             context = command.make_context(f"toonset {stage}", [*_usual(verb, words), *words, *own])
+            values = arguments_of(context)
     except Exception as error:
         said = refusal(error)
         if said is None:
             raise
         raise UsageError(f"{where}: {said}") from error
-    values = dict(context.params)
     given = values.pop(verb.argument)
     if given not in ([PLACE], PLACE):
         raise UsageError(f"{where}: {stage} reads the sheet's own; options only are taken here")
@@ -207,7 +208,7 @@ def _check_values(stage: str, values: Mapping[str, Any]) -> None:
     from toonset.cli.common.storage import is_url
     from toonset.dataset.split_folder.cutting import Cutting
     from toonset.dataset.split_folder.view_labels import parse_labels
-    from toonset.palette.extract import options_of
+    from toonset.palette.extract import rule_of
 
     if stage == "calibrate":
         labels, locked = values["labels"], tuple(lock.value for lock in values["locked"] or ())
@@ -216,8 +217,8 @@ def _check_values(stage: str, values: Mapping[str, Any]) -> None:
         if labels:
             parse_labels(labels, labels.count(",") + 1)
     if stage == "palette":
-        kept = "" if is_url(values["keep"]) else values["keep"]
-        options_of(values["min_share"], values["max_colors"], kept)
+        options = values["options"]
+        rule_of(replace(options, keep="") if is_url(options.keep) else options)
 
 
 def _typed(context: Any, verb: Stage, words: Sequence[str]) -> str:
@@ -266,7 +267,7 @@ def files_among(values: Mapping[str, Any], words: Sequence[str], root: Path) -> 
     """
     typed = {str(Path(value)): value for value in map(value_of, words) if value}
     found = {}
-    for name, value in values.items():
+    for name, value in each_of(values).items():
         for one in value if isinstance(value, list | tuple) else [value]:
             text, is_path = str(one), isinstance(one, Path) and one != PLACE
             if is_path and not (name == "mesh" and text == NO_BODY):
@@ -299,7 +300,7 @@ def run(stage: str, words: Sequence[str], sheets: Sequence[str], home: Path) -> 
     own = {"force": True, "as_json": True, "threads": 1}
     values |= {name: value for name, value in own.items() if name in values}
     try:
-        _command(stage).callback(**values)
+        verb_of(_command(stage))(**values)
     except typer.Exit as leaving:
         return leaving.exit_code
     return 0
@@ -372,7 +373,7 @@ def _options(stage: str, entry: Entry, hash_of: Callable[[str], str]) -> dict[st
             return _file(files[str(value)], hash_of)
         return value.value if isinstance(value, Enum) else str(value)
 
-    return {name: plain(value) for name, value in values.items()}
+    return {name: plain(value) for name, value in each_of(values).items()}
 
 
 def _file(place: str, hash_of: Callable[[str], str]) -> list[str]:

@@ -12,6 +12,7 @@ import typer
 from typer import _completion_shared
 from typer.core import TyperCommand, TyperGroup
 
+from toonset.cli.common.flags import arguments_of, verb_of
 from toonset.errors import UsageError, did_you_mean
 
 NOTHING_ASKED = 2  # exit code, as of any wrong use
@@ -29,7 +30,7 @@ class Verb(TyperCommand):
     def invoke(self, ctx: Any) -> Any:
         """Run the verb; arguments that contradict each other are named with the verb's help."""
         try:
-            return super().invoke(ctx)
+            return ctx.invoke(verb_of(self), **arguments_of(ctx))
         except UsageError as error:
             raise typer.BadParameter(str(error), ctx=ctx) from error
 

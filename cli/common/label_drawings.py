@@ -10,20 +10,16 @@ from toonset.errors import PaletteError, ToonsetError
 from toonset.palette.corrected import correct_palette
 from toonset.palette.corrections import PaletteCorrections
 from toonset.palette.extract import Map, PaintMap, choose_palette
-from toonset.palette.paints.select import PaletteRule
+from toonset.palette.options import PaletteOptions
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.labels import Space
-from toonset.palette.printed import Printed
 
 
 def label_drawings(
     drawn: Pictures,
     contours: list[Map],
-    options: PaletteRule,
+    options: PaletteOptions = PaletteOptions(),
     given: Given | None = None,
-    *,
-    colors: str | None = None,
-    swatches: bool | None = None,
     space: Space = "rgb",
 ) -> tuple[Palette, list[PaintMap] | None, tuple[str, ...]]:
     """Return the palette, its maps where a person corrected them, and notes for people.
@@ -31,10 +27,8 @@ def label_drawings(
     Args:
         drawn: the drawings.
         contours: how far drawn lines cover their pixels.
-        options: how colours are chosen, those that corrections keep included.
+        options: how colours are chosen; those that corrections keep are kept, too.
         given: what a person corrected.
-        colors: a palette of the user's own: see `extract_palette`.
-        swatches: see `extract_palette`.
         space: in which the nearest colour is meant.
 
     Raises:
@@ -42,8 +36,9 @@ def label_drawings(
     """
     wanted = PaletteCorrections() if given is None else given.content.palette
     try:
-        printed = Printed(drawn.swatches, swatches)
-        found = choose_palette(drawn.pictures, contours, options, colors, printed)
+        if wanted.keep:
+            options = replace(options, keep=",".join(wanted.keep))
+        found = choose_palette(drawn.pictures, contours, options, drawn.swatches)
     except ToonsetError as error:
         if given is None or not wanted.keep:
             raise

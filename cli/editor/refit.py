@@ -26,15 +26,12 @@ from toonset.dataset.split_folder.pictures import load_pictures
 from toonset.json_file import read_json
 from toonset.lock import FOLDERS, hold, set_of
 from toonset.mesh import Mesh
-from toonset.palette.extract import options_of
-from toonset.palette.palette import MAX_COLORS
 from toonset.palette.pixels.ink_lines import find_contours
 from toonset.view import SHEET, InputFile, Origin, View
 from toonset.write import exchange_folders, write_bytes, write_json
 
 CORRECTIONS = "corrections.json"
 NOTHING: dict[str, Any] = {"version": 1}
-LEAST_SHARE = 0.05  # of a paint, as `palette` has it
 BY_HAND = "corrections"  # the file's role among a bundle's inputs
 RUN = "run"  # a trained field: it stays, whatever becomes of the cameras
 CUT, CAMERAS, PALETTE = ("background", "boxes", "group", "outfit"), "views", "palette"
@@ -211,8 +208,7 @@ def find_palette(folder: Path, corrections: dict[str, Any]) -> None:
     given = Given(Path(CORRECTIONS), parse_corrections(file_of(corrections), CORRECTIONS))
     drawn = load_pictures([folder])
     contours = find_contours(drawn.pictures)
-    options = options_of(LEAST_SHARE, MAX_COLORS, ",".join(given.content.palette.keep))
-    found, maps, _ = label_drawings(drawn, contours, options, given)
+    found, maps, _ = label_drawings(drawn, contours, given=given)
     write_labelled(folder, found, drawn.names, drawn.pictures, contours, "rgb", maps)
 
 

@@ -23,12 +23,12 @@ from toonset.dataset.images.picture import load_indexed_png, load_rgba
 from toonset.dataset.mesh.load import load_mesh
 from toonset.errors import BundleError
 from toonset.lock import settle
+from toonset.options import SYMMETRIC, Symmetric
 from toonset.palette.extract import IN_LIGHT, IN_SHADOW
 from toonset.palette.formats.json import read_palette_json
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.labels import UNLABELLED
 from toonset.palette.shaded import ramps_of
-from toonset.symmetric import SYMMETRIC, Symmetric
 
 MANNEQUIN, CALIBRATION = "mannequin.obj", "calibration.json"
 Labels = UInt8[np.ndarray, "height width"]

@@ -9,9 +9,9 @@ from jaxtyping import UInt8
 
 from toonset.camera import Camera
 from toonset.mesh import Mesh
+from toonset.options import Symmetric
 from toonset.palette.palette import Shadow
 from toonset.palette.pixels.ramp_labels import Ramp
-from toonset.symmetric import Symmetric
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,7 +23,7 @@ from toonset.camera import Camera, rotation_distance
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.silhouettes.mask import mask_of
 from toonset.nerf.sections.drawing import mirrored_camera
-from toonset.symmetric import Symmetric
+from toonset.options import Symmetric
 
 FACING = math.radians(20)  # between the mirror plane and a drawing that shows both sides
 NEW = math.radians(20)  # a mirrored drawing this near to a drawn one adds nothing

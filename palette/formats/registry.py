@@ -21,7 +21,8 @@ from toonset.palette.formats.json import json_title, read_json, to_json
 from toonset.palette.formats.text import without_mark
 from toonset.palette.formats.tones import paints_of
 from toonset.palette.names import NamedColor, clean_name
-from toonset.palette.palette import MAX_COLORS, Palette
+from toonset.palette.options import MAX_COLORS
+from toonset.palette.palette import Palette
 from toonset.read import describe, read_whole
 
 UNTITLED = "toonset"

@@ -17,6 +17,7 @@ from toonset.errors import PaletteError
 from toonset.palette.color_names import name_of
 from toonset.palette.colors import JUST_NOTICEABLE, oklab_from_rgb
 from toonset.palette.names import hex_of
+from toonset.palette.options import MAX_COLORS
 from toonset.palette.paints.areas import paint_areas
 from toonset.palette.paints.clusters import Paint, find_paints
 from toonset.palette.paints.histogram import Histogram, count_pixels
@@ -25,14 +26,7 @@ from toonset.palette.paints.places import patches_of, pixels_of
 from toonset.palette.paints.select import Amount, PaletteRule, choose, measure, with_wanted
 from toonset.palette.paints.small_features import near_equal_paints, tiny_paints
 from toonset.palette.paints.warnings import lone_spot_notes, wide_paint_notes
-from toonset.palette.palette import (
-    MAX_COLORS,
-    ContourColor,
-    DroppedColor,
-    Palette,
-    PaletteColor,
-    Place,
-)
+from toonset.palette.palette import ContourColor, DroppedColor, Palette, PaletteColor, Place
 from toonset.palette.pixels.labels import nearest_colors
 
 PICKED = "picked by hand; what is not among these colours counts for the nearest"

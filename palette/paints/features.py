@@ -15,8 +15,9 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from toonset.palette.colors import JUST_NOTICEABLE, oklab_from_rgb
+from toonset.palette.options import MAX_COLORS
 from toonset.palette.paints.clusters import UNLIKE
-from toonset.palette.palette import MAX_COLORS, Palette, Shadow
+from toonset.palette.palette import Palette, Shadow
 from toonset.palette.pixels.labels import nearest_labels
 from toonset.palette.pixels.shadow import apply_shadow
 

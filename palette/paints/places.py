@@ -9,8 +9,9 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Int, UInt8
 
+from toonset.palette.options import MAX_COLORS
 from toonset.palette.paints.histogram import OPAQUE_WORD, RGB, Histogram
-from toonset.palette.palette import MAX_COLORS, Palette, Place
+from toonset.palette.palette import Palette, Place
 from toonset.palette.pixels.labels import nearest_labels
 
 THIN = 2  # pixels: blends along an edge are thinner

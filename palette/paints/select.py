@@ -11,9 +11,9 @@ from jaxtyping import Float
 from toonset.errors import PaletteError
 from toonset.palette.colors import JUST_NOTICEABLE, oklab_from_rgb
 from toonset.palette.names import hex_of
+from toonset.palette.options import PaletteOptions
 from toonset.palette.paints.areas import Areas
 from toonset.palette.paints.clusters import Paint
-from toonset.palette.palette import MAX_COLORS
 
 KEEP_REACH = (
     4 * JUST_NOTICEABLE
@@ -21,42 +21,34 @@ KEEP_REACH = (
 OPEN = 0.25  # of a colour's blends: the deviation of an even spread over 0 to 1, in its favour
 
 RGB = tuple[int, int, int]
+USUAL = PaletteOptions()
 
 
 @dataclass(frozen=True)
 class PaletteRule:
-    """Options of choosing colours.
+    """Which of the colours that were found stay.
 
     Attributes:
-        min_share: least share of the character's pixels, 0 to 1; the paper's rule is 5 %.
-        max_colors: at most so many, the largest; 1 to 255, as many as a label can name.
+        min_share: as of `PaletteOptions`, as are `max_colors` and `features`.
+        max_colors: also of these.
         keep: 8-bit sRGB: the found colours nearest to these stay, however small they are.
         contour: count the drawn lines to their colour, as the paper does; False leaves that colour
             to what else is painted with it. Matters only where the lines are given.
         features: keep small colours that recur at one place of the character; None: as True.
     """
 
-    min_share: float = 0.05
-    max_colors: int = MAX_COLORS
+    min_share: float = USUAL.min_share
+    max_colors: int = USUAL.max_colors
     keep: tuple[RGB, ...] = ()
-    contour: bool = True
-    features: bool | None = None
+    contour: bool = USUAL.contour
+    features: bool | None = USUAL.features
 
     def __post_init__(self) -> None:
-        """Refuse shares and numbers without a meaning.
+        """Refuse more colours to keep than are wanted.
 
         Raises:
-            PaletteError: out of range.
+            PaletteError: so many.
         """
-        if not 0 <= self.min_share <= 1:
-            raise PaletteError(
-                f"--min-share: {self.min_share:g} is no share; give 0 to 1, as 0.05 for 5 %"
-            )
-        if not 1 <= self.max_colors <= MAX_COLORS:
-            raise PaletteError(
-                f"--max-colors: {self.max_colors} colours; give 1 to {MAX_COLORS}, as many as a "
-                "label can name"
-            )
         if len(self.keep) > self.max_colors:
             raise PaletteError(
                 f"--keep: {len(self.keep)} colours, but at most {self.max_colors} are wanted; "

@@ -22,7 +22,8 @@ from jaxtyping import Bool, Float, UInt8
 from scipy.special import log_ndtr
 
 from toonset.palette.names import RGB
-from toonset.palette.palette import MAX_COLORS, Palette, PaletteColor, Tone
+from toonset.palette.options import MAX_COLORS
+from toonset.palette.palette import Palette, PaletteColor, Tone
 from toonset.palette.pixels.labels import (
     UNLABELLED,
     Space,

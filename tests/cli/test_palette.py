@@ -14,6 +14,7 @@ from toonset.dataset.bundle.read_scene import read_scene
 from toonset.dataset.bundle.transforms import transforms_dict
 from toonset.dataset.images.picture import encode_png, load_indexed_png, load_rgba
 from toonset.errors import OutputError, ToonsetError
+from toonset.palette.options import PaletteOptions
 from toonset.palette.palette import Evidence, Palette, PaletteColor
 from toonset.write import write_bytes, write_json
 
@@ -72,7 +73,7 @@ def test_a_second_run_replaces_the_first_by_the_same_bytes(tmp_path: Path, snaps
     before = snapshot(bundle)
     palette([bundle])
     assert snapshot(bundle) == before
-    palette([bundle], colors="#00ff00")
+    palette([bundle], options=PaletteOptions(colors="#00ff00"))
     assert snapshot(bundle).keys() == before.keys()
     content = json.loads((bundle / "palette.json").read_text())
     assert [color["hex"] for color in content["colors"]] == ["#00ff00"]
@@ -114,10 +115,10 @@ def test_pictures_go_into_a_folder_of_their_own(tmp_path, capsys):
 
 def test_what_is_dropped_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bundle = make_bundle(tmp_path / "b")
-    palette([bundle], min_share=0.5)
+    palette([bundle], PaletteOptions(min_share=0.5))
     said = capsys.readouterr().out
     assert "left out by the rule: #143cb4 blue (--keep '#143cb4' keeps one)\n" in said
-    palette([bundle], min_share=0.5, verbose=True)
+    palette([bundle], PaletteOptions(min_share=0.5), verbose=True)
     lines = capsys.readouterr().out.splitlines()
     assert "rule: at least 50 % of the character's pixels" in lines[1]
     assert lines[2].startswith("left out")
@@ -164,8 +165,9 @@ def test_mistakes_write_nothing(arguments, options, fragment, tmp_path, monkeypa
     )
     write_json(Path("outside/transforms.json"), outside)
     before = tree(tmp_path)
+    places, out = [Path(one) for one in arguments], options.pop("out", None)
     with pytest.raises(ToonsetError, match=fragment):
-        palette([Path(argument) for argument in arguments], **options)  # type: ignore[arg-type]
+        palette(places, PaletteOptions(**options), out=out)
     assert tree(tmp_path) == before
 
 
@@ -181,7 +183,12 @@ def outlined() -> np.ndarray:
 def test_lines_can_be_left_out_of_palette_and_labels(tmp_path: Path) -> None:
     write_bytes(tmp_path / "a.png", encode_png(outlined()))
     for contour in (True, False):
-        palette([tmp_path / "a.png"], contour=contour, out=tmp_path / "out", force=True)
+        palette(
+            [tmp_path / "a.png"],
+            options=PaletteOptions(contour=contour),
+            out=tmp_path / "out",
+            force=True,
+        )
         content = json.loads((tmp_path / "out" / "palette.json").read_text())
         assert ("#000000" in [color["hex"] for color in content["colors"]]) == contour
         assert content["contour"]["hex"] == "#000000"
@@ -214,7 +221,7 @@ def test_a_left_out_colour_can_be_kept(tmp_path: Path, capsys: pytest.CaptureFix
     palette([tmp_path / "a.png"], out=tmp_path / "without", verbose=True)
     shown = capsys.readouterr().out
     assert "picture 0 at (30, 20), 6 x 4 px" in shown
-    palette([tmp_path / "a.png"], keep="#fadc32", out=tmp_path / "with")
+    palette([tmp_path / "a.png"], options=PaletteOptions(keep="#fadc32"), out=tmp_path / "with")
     content = json.loads((tmp_path / "with" / "palette.json").read_text())
     assert "#fadc32" in [color["hex"] for color in content["colors"]]
 
@@ -225,7 +232,7 @@ STUDIO = "GIMP Palette\nName: Studio\n#\n200 30 40\tHair base\n20 60 180\tCoat\n
 def test_names_and_title_of_a_given_palette_are_kept(tmp_path: Path) -> None:
     bundle = make_bundle(tmp_path / "b")
     (tmp_path / "n.gpl").write_text(STUDIO)
-    palette([bundle], colors=str(tmp_path / "n.gpl"))
+    palette([bundle], PaletteOptions(colors=str(tmp_path / "n.gpl")))
     written = json.loads((bundle / "palette.json").read_text())
     assert written["title"] == "Studio"
     assert [color["name"] for color in written["colors"]] == ["Hair base", "Coat", "black"]
@@ -236,7 +243,7 @@ def test_names_and_title_of_a_given_palette_are_kept(tmp_path: Path) -> None:
     assert all(name.encode("utf-16-be") in ase for name in ("Studio", "Hair base", "Coat"))
     for end in ("json", "ase", "gpl"):  # and again, from what was written
         again = tmp_path / end
-        palette([bundle], colors=str(bundle / f"palette.{end}"), out=again)
+        palette([bundle], PaletteOptions(colors=str(bundle / f"palette.{end}")), out=again)
         assert json.loads((again / "palette.json").read_text()) == written
     recolor(["hair base=#00ff00"], [bundle], tmp_path / "green")
     recolor(["red=#00ff00"], [bundle], tmp_path / "too")
@@ -258,7 +265,7 @@ def test_a_palette_is_called_as_its_sheet_or_folder(tmp_path: Path, toonset) -> 
         out = tmp_path / f"colours of {title}"
         palette([given], out=out)
         assert f"Name: {title}\n" in (out / "palette.gpl").read_text()
-        palette([given], out=out, force=True, colors="#c81e28,#143cb4")
+        palette([given], out=out, force=True, options=PaletteOptions(colors="#c81e28,#143cb4"))
         assert json.loads((out / "palette.json").read_text())["title"] == title
     split([girl], out=tmp_path / "views")
     palette([tmp_path / "views"], out=tmp_path / "split")

@@ -9,6 +9,7 @@ from tests.palette.pictures import opaque
 from toonset.palette.color_names import SURVEY, distinct_names, meant_by, name_of
 from toonset.palette.extract import extract_palette
 from toonset.palette.names import rgb_of_hex
+from toonset.palette.options import PaletteOptions
 from toonset.palette.recolor import change_colors
 
 
@@ -80,7 +81,7 @@ def test_parts_are_those_of_the_drawing() -> None:
     top, bottom = (124, 72, 48), (126, 74, 62)
     rows = np.repeat(np.array([top, (40, 100, 215), bottom], dtype=np.uint8), [60, 110, 30], axis=0)
     picture = opaque(np.repeat(rows[:, None], 80, axis=1))
-    found = extract_palette([picture], colors="#7c4830,#2864d7,#7e4a3e")
+    found = extract_palette([picture], PaletteOptions(colors="#7c4830,#2864d7,#7e4a3e"))
     assert [one.name for one in found.colors] == ["brown (head)", "blue", "brown (feet)"]
 
 

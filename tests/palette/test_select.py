@@ -8,6 +8,7 @@ import pytest
 from tests.palette.pictures import as_set, block, ramp, soft_stripes
 from toonset.errors import PaletteError
 from toonset.palette.colors import oklab_from_rgb
+from toonset.palette.options import PaletteOptions
 from toonset.palette.paints.extract import find_palette, pick_palette
 from toonset.palette.paints.places import add_places
 from toonset.palette.paints.select import PaletteRule
@@ -63,8 +64,8 @@ BLACK = PaletteColor((0, 0, 0), 0.0, "black")
     [
         (lambda: find_palette([]), "no picture given"),
         (lambda: find_palette([np.zeros((9, 9, 4), dtype=np.uint8)]), "no opaque pixel"),
-        (lambda: PaletteRule(min_share=5.0), "--min-share: 5 is no share; give 0 to 1"),
-        (lambda: PaletteRule(max_colors=0), "--max-colors: 0 colours; give 1 to 255"),
+        (lambda: PaletteOptions(min_share=5.0), "--min-share: 5 is no share; give 0 to 1"),
+        (lambda: PaletteOptions(max_colors=0), "--max-colors: 0 colours; give 1 to 255"),
         (lambda: Palette((), "none"), "0 colours; 1 to 255 are needed"),
         (lambda: Palette((BLACK,) * 256, "many"), "256 colours; 1 to 255 are needed"),
     ],

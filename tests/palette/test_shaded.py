@@ -11,6 +11,7 @@ from toonset.palette.corrections import Divided, PaletteCorrections
 from toonset.palette.extract import choose_palette, extract_palette, paint_maps
 from toonset.palette.formats.json import palette_of, to_json
 from toonset.palette.names import hex_of
+from toonset.palette.options import PaletteOptions
 from toonset.palette.paints.ramps import join_patches, moments_of
 from toonset.palette.paints.select import PaletteRule
 from toonset.palette.palette import Palette
@@ -120,25 +121,25 @@ def test_a_ramp_is_one_patch_and_an_edge_parts_two() -> None:
 def test_left_out_paints_are_listed_and_come_back() -> None:
     pictures, _, _ = _found()
     lines = [np.zeros(one.shape[:2], np.uint8) for one in pictures]
-    plain = choose_palette(pictures, lines, PaletteRule(min_share=0.2, features=False))
+    plain = choose_palette(pictures, lines, PaletteOptions(min_share=0.2, features=False))
     belt = min(plain.dropped, key=lambda one: np.abs(np.array(one.rgb) - BELT).sum())
     assert belt.share < 0.2
     assert belt.rgb not in [color.rgb for color in plain.colors]
     for options in (
-        PaletteRule(min_share=0.2, features=False, keep=(belt.rgb,)),
-        PaletteRule(min_share=0.01, features=False),
+        PaletteOptions(min_share=0.2, features=False, keep=hex_of(belt.rgb)),
+        PaletteOptions(min_share=0.01, features=False),
     ):
         kept = choose_palette(pictures, lines, options)
         away = [np.abs(np.array(color.rgb) - belt.rgb).max() for color in kept.colors]
         assert min(away) <= 6
     with pytest.raises(PaletteError, match="no such colour"):
-        choose_palette(pictures, lines, PaletteRule(keep=((0, 255, 0),)))
+        choose_palette(pictures, lines, PaletteOptions(keep="#00ff00"))
 
 
 def test_colours_picked_by_hand_get_ramps() -> None:
     pictures, truth, _ = _found()
     lines = [np.zeros(one.shape, np.uint8) for one in truth]
-    palette = choose_palette(pictures, lines, colors="#e6b491,#6e402a,#3260a0,#be282c")
+    palette = choose_palette(pictures, lines, PaletteOptions("#e6b491,#6e402a,#3260a0,#be282c"))
     assert [color.rgb for color in palette.colors] == list(PAINTS)
     assert all(color.tones for color in palette.colors)
     assert sum(color.share for color in palette.colors) == pytest.approx(1)
@@ -266,7 +267,7 @@ def test_a_dark_tone_of_a_ramp_is_no_colour_to_keep_besides() -> None:
     pictures, _, found = _found()
     dark = found.colors[0].tones[-1].rgb
     kept = choose_palette(
-        pictures, [np.zeros_like(p[..., 0]) for p in pictures], PaletteRule(keep=(dark,))
+        pictures, [np.zeros_like(p[..., 0]) for p in pictures], PaletteOptions(keep=hex_of(dark))
     )
     assert len(kept.colors) == len(found.colors)
 
@@ -274,7 +275,7 @@ def test_a_dark_tone_of_a_ramp_is_no_colour_to_keep_besides() -> None:
 def test_what_a_shaded_palette_leaves_out_is_written_and_read() -> None:
     pictures, _, _ = _found()
     contours = [np.zeros_like(picture[..., 0]) for picture in pictures]
-    found = choose_palette(pictures, contours, PaletteRule(max_colors=2))
+    found = choose_palette(pictures, contours, PaletteOptions(max_colors=2))
     assert found.dropped
     assert [one.rgb for one in palette_of(to_json(found), "here").dropped] == [
         one.rgb for one in found.dropped

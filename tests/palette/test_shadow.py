@@ -12,6 +12,7 @@ from toonset.palette.extract import extract_palette, paint_maps
 from toonset.palette.formats.json import palette_of, to_json
 from toonset.palette.formats.registry import encode_palette
 from toonset.palette.names import hex_of
+from toonset.palette.options import PaletteOptions
 from toonset.palette.paints.features import find_features
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.ink_lines import find_contour
@@ -77,7 +78,7 @@ def test_pictures_without_room_have_no_shadow() -> None:
 
 def test_paints_are_what_they_are_in_light_with_both_tones() -> None:
     drawn = drawings(shadow=True, noisy=True)
-    palette = extract_palette(pictures(drawn), features=False)
+    palette = extract_palette(pictures(drawn), PaletteOptions(features=False))
     assert len(palette.colors) == len(PAINTS)
     paint = np.concatenate([one.paint.ravel() for one in drawn])
     dark = np.concatenate([one.dark.ravel() for one in drawn])
@@ -116,16 +117,16 @@ def test_small_eyes_are_features_of_a_shaded_sheet() -> None:
     assert away(eye, EYE) < 0.05
     assert eye in [color.rgb for color in palette.colors]
     assert eye not in [color.rgb for color in palette.dropped]
-    plain = extract_palette(pictures(drawn), features=False)
+    plain = extract_palette(pictures(drawn), PaletteOptions(features=False))
     assert plain.features == ()
     assert [color.rgb for color in plain.dropped] == [eye]
-    few = extract_palette(pictures(drawn), max_colors=len(PAINTS))
+    few = extract_palette(pictures(drawn), PaletteOptions(max_colors=len(PAINTS)))
     assert few.features == ()
 
 
 def test_features_of_flat_sheets_are_kept_too() -> None:
     drawn = pictures(drawings(shadow=False, noisy=False))
-    plain = to_json(extract_palette(drawn, features=False))
+    plain = to_json(extract_palette(drawn, PaletteOptions(features=False)))
     assert {color["hex"] for color in plain["colors"]} == {hex_of(rgb) for rgb in PAINTS}
     assert (plain["shadow"], plain["features"]) == (None, [])
     assert all(color["tones"] == [] for color in plain["colors"])
@@ -157,7 +158,7 @@ def _with_spots(spotted: list[np.ndarray], heights: list[int], side: int = 9) ->
     """Draw a white spot into every picture and return their palette."""
     for picture, row in zip(spotted, heights, strict=True):
         picture[row : row + side, 62 : 62 + side] = (*EYE, 255)
-    return extract_palette(spotted, features=False)
+    return extract_palette(spotted, PaletteOptions(features=False))
 
 
 def test_tones_say_which_paint_lies_in_shadow() -> None:
@@ -183,13 +184,13 @@ def test_a_file_with_tones_gives_the_same_paints_of_the_sheet(
     found = extract_palette(pictures(drawn))
     file = tmp_path / f"own{extension}"
     file.write_bytes(encode_palette(found, extension))
-    again = extract_palette(pictures(drawn), colors=str(file))
+    again = extract_palette(pictures(drawn), PaletteOptions(colors=str(file)))
     assert again.shadow == found.shadow
     assert np.array_equal(again.rgb, found.rgb)
     for one, other in zip(again.colors, found.colors, strict=True):
         assert [tone.rgb for tone in one.tones] == [tone.rgb for tone in other.tones]
     plain = ",".join(hex_of(color.rgb) for color in found.colors)
-    assert extract_palette(pictures(drawn), colors=plain).shadow is None
+    assert extract_palette(pictures(drawn), PaletteOptions(colors=plain)).shadow is None
     content = to_json(found)
     assert content["shadow"]
     assert to_json(palette_of(content, "palette.json")) == content
@@ -216,5 +217,5 @@ def test_a_paint_whose_shadow_is_lighter_or_deeper_is_one_paint(tunic: float) ->
 def test_a_colour_that_is_to_be_kept_is_no_shadow() -> None:
     drawn = drawings(shadow=True, noisy=False, tunic=1.16)
     dark = np.rint(np.array(PAINTS[1]) * np.array(FACTOR) * 1.16).astype(int)
-    palette = extract_palette(pictures(drawn), keep=hex_of(tuple(dark.tolist())))
+    palette = extract_palette(pictures(drawn), PaletteOptions(keep=hex_of(tuple(dark.tolist()))))
     assert all(color.factor is None for color in palette.colors)

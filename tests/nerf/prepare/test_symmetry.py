@@ -23,7 +23,7 @@ from toonset.nerf.prepare.symmetry import (
     mirrored,
 )
 from toonset.nerf.train.fit_field import fit_field
-from toonset.symmetric import Symmetric
+from toonset.options import Symmetric
 
 FLAT = SynthOptions(cell_px=80, outline_px=0, elevation_deg=8)
 FRONT_SIDE_BACK = (0, 2, 4)

@@ -12,7 +12,8 @@ import pytest
 from toonset.errors import PaletteError
 from toonset.palette.formats.json import read_palette_json
 from toonset.palette.formats.registry import encode_palette, parse_named_colors
-from toonset.palette.palette import MAX_COLORS, ContourColor, DroppedColor, Palette, PaletteColor
+from toonset.palette.options import MAX_COLORS
+from toonset.palette.palette import ContourColor, DroppedColor, Palette, PaletteColor
 
 PALETTE = Palette(
     tuple(PaletteColor((40 * i, 200 - 30 * i, 17 * i), 0.15, f"colour {i}") for i in range(6)),

@@ -18,7 +18,8 @@ from toonset.palette.formats.registry import (
     parse_named_colors,
 )
 from toonset.palette.names import NamedColor
-from toonset.palette.palette import MAX_COLORS, Palette, PaletteColor, Tone
+from toonset.palette.options import MAX_COLORS
+from toonset.palette.palette import Palette, PaletteColor, Tone
 
 
 def test_typed_lists() -> None:

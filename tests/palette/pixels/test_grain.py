@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from toonset.palette.extract import extract_palette, label_image
+from toonset.palette.options import PaletteOptions
 from toonset.palette.pixels.grain import noise_levels, remove_grain
 from toonset.palette.pixels.ink_lines import find_contours
 from toonset.palette.pixels.labels import UNLABELLED
@@ -54,7 +55,7 @@ def test_paints_on_rough_paper_are_regions(seed: int) -> None:
     paint = figure()
     picture = drawn(paint, 20.0, seed)
     colors = ",".join(f"#{red:02x}{green:02x}{blue:02x}" for red, green, blue in PAINTS.tolist())
-    palette = extract_palette([picture], colors=colors)
+    palette = extract_palette([picture], PaletteOptions(colors=colors))
     apart = np.linalg.norm(palette.rgb[:, None].astype(int) - PAINTS, axis=2)
     labels = label_image(picture, palette)
     square = np.ones((3, 3), dtype=np.uint8)
@@ -82,7 +83,7 @@ def test_lines_are_not_seen_in_grain() -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_paints_are_found_in_grain_with_the_colours_that_they_have(seed: int) -> None:
-    palette = extract_palette([drawn(figure(), 16.0, seed)], contour=False)
+    palette = extract_palette([drawn(figure(), 16.0, seed)], PaletteOptions(contour=False))
     apart = np.linalg.norm(palette.rgb[:, None].astype(int) - PAINTS, axis=2)
     assert sorted(apart.argmin(axis=1)) == [0, 1, 2, 3]
     assert apart.min(axis=1).max() < 5  # of 255: a fifth of a grain, not what lies beside
