@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag
-from toonset.nerf.options import FACES, ORIGINAL
+from toonset.nerf.options import ORIGINAL, MeshOptions
 
 
 def mesh(
@@ -21,36 +21,7 @@ def mesh(
             "-o", "--out", help="File to write: .glb, .obj or .ply.", rich_help_panel=OUTPUT_PANEL
         ),
     ],
-    faces: Annotated[
-        int,
-        typer.Option(
-            "--faces",
-            min=100,
-            help="Triangles at most, if they can close it; 1000000: as fine as the run.",
-        ),
-    ] = FACES,
-    texture: Annotated[
-        bool, typer.Option("--texture", help="Paint it as the drawings are: .glb, .obj.")
-    ] = False,
-    outline: Annotated[
-        bool, typer.Option("--outline", help="With --texture: the sheet's outline as a hull: .glb.")
-    ] = False,
-    recolor: Annotated[
-        list[str] | None,
-        typer.Option("--recolor", help="OLD=NEW, e.g. '#aa0000=#00aa00'; repeatable."),
-    ] = None,
-    variants: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--variants",
-            metavar="FILE",
-            help="Other colours besides, a palette file or '#aa0000,#00aa00', in order; "
-            "repeatable: .glb.",
-        ),
-    ] = None,
-    nearest: Annotated[
-        bool, typer.Option("--nearest", help="Match --variants by likeness, not by order.")
-    ] = False,
+    options: MeshOptions = MeshOptions(),
     threads: Annotated[
         int | None,
         typer.Option("--threads", min=1, max=1024, help="CPU threads (default: all cores)."),
@@ -72,10 +43,6 @@ def mesh(
     --variants puts more palettes into one GLB, as variants (KHR_materials_variants) that viewers
     and engines switch between: the run's own, "original", first, then one per file.
     """
-    if outline and not texture:
-        raise typer.BadParameter("--outline belongs to --texture")
-    if nearest and not variants:
-        raise typer.BadParameter("--nearest belongs to --variants")
     import torch
 
     from toonset.nerf.render.recolor import recolor_run, variants_of
@@ -85,10 +52,12 @@ def mesh(
     from toonset.nerf.surface.texture import texture_surface
     from toonset.nerf.surface.textured_files import check_textured_files, encode_textured_files
 
-    trained = recolor_run(read_field(run), recolor or [])
-    check = partial(check_textured_files, outline=outline) if texture else check_mesh_files
-    check(out, force=force, variants=bool(variants))
-    others = variants_of(trained, variants or [], nearest=nearest)
+    trained = recolor_run(read_field(run), options.recolor)
+    check = check_mesh_files
+    if options.texture:
+        check = partial(check_textured_files, outline=options.outline)
+    check(out, force=force, variants=bool(options.variants))
+    others = variants_of(trained, options.variants, nearest=options.nearest)
     if threads is not None:
         torch.set_num_threads(threads)
     printer = Printer(as_json, quiet)
@@ -97,20 +66,22 @@ def mesh(
         printer.progress(f"{step} {done:.0%}")
 
     values: dict[str, Any] = {}
-    if texture:
-        textured = texture_surface(trained, faces, progress, outline=outline, variants=others)
+    if options.texture:
+        textured = texture_surface(
+            trained, options.faces, progress, outline=options.outline, variants=others
+        )
         surface, files = textured.surface, encode_textured_files(textured, out)
         values["texture"] = list(textured.atlas.size_wh)
         values["by_field"] = float((textured.source < 0).mean())
     else:
-        surface = surface_of(trained, faces, progress, variants=others)
+        surface = surface_of(trained, options.faces, progress, variants=others)
         files = mesh_files(surface, out)
     write_mesh_files(files, out, force=force)
     if others:
         values["variants"] = [ORIGINAL, *(name for name, _ in others)]
     values |= {"faces": len(surface.faces), "vertices": len(surface.vertices)}
     values["bytes"] = {name: len(data) for name, data in files.items()}
-    printer.result({"out": out, **values}, _text(out, values, faces))
+    printer.result({"out": out, **values}, _text(out, values, options.faces))
 
 
 def _text(out: Path, values: Mapping[str, Any], faces: int) -> str:

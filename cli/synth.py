@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import typer
 
+from toonset.cli.common.flags import Given
 from toonset.cli.common.output import (
     OUTPUT_PANEL,
     ForceFlag,
@@ -26,25 +27,10 @@ WRITTEN = (
     *("sheet.png", "sheet.jpg", "views", "labels", "ink", "shadows", "test"),
     *("mannequin.obj", "truth.json"),
 )
-DEFAULT = SynthOptions()
-FIELDS = {  # of SynthOptions, by the function's parameter
-    "views": "views",
-    "cell": "cell_px",
-    "columns": "columns",
-    "yaw_jitter": "yaw_jitter_deg",
-    "elevation": "elevation_deg",
-    "distance": "distance_heights",
-    "outline": "outline_px",
-    "label_lines": "label_lines",
-    "warp": "warp_percent",
-    "scale_error": "scale_error_percent",
-    "background": "background",
-}
 TEST_VIEWS = 16
 
 
 def synth(
-    context: typer.Context,
     mesh: Annotated[
         Path, typer.Argument(help="Character: obj, ply, stl, glb, vrm, off; colours kept.")
     ],
@@ -60,45 +46,10 @@ def synth(
             "Other options override it."
         ),
     ] = "plain",
-    views: Annotated[
-        int,
-        typer.Option(
-            help="Drawings, evenly round; studio (4, at most 8): front, back, side, 3/4 first."
-        ),
-    ] = DEFAULT.views,
+    typed: Given[SynthOptions] = Given(SynthOptions),
     pose_difference: Annotated[
         float, typer.Option(help="Bodies of a condition's drawings differ by this times as much.")
     ] = 1.0,
-    yaw_jitter: Annotated[
-        float, typer.Option(help="Each view is turned wrongly by up to this, degrees.")
-    ] = DEFAULT.yaw_jitter_deg,
-    elevation: Annotated[
-        float, typer.Option(help="Cameras look down by this, degrees.")
-    ] = DEFAULT.elevation_deg,
-    distance: Annotated[
-        float, typer.Option(help="Camera distance in body heights; 0 = orthographic.")
-    ] = DEFAULT.distance_heights,
-    outline: Annotated[
-        float, typer.Option(help="Width of the black outline, px; 0 = none.")
-    ] = DEFAULT.outline_px,
-    label_lines: Annotated[
-        bool, typer.Option(help="Draw lines between colours, too.")
-    ] = DEFAULT.label_lines,
-    warp: Annotated[
-        float, typer.Option(help="Smooth drawing error (rms), percent of the cell.")
-    ] = DEFAULT.warp_percent,
-    scale_error: Annotated[
-        float, typer.Option(help="Each view is larger or smaller by up to this, percent.")
-    ] = DEFAULT.scale_error_percent,
-    following: Annotated[
-        list[str] | None,
-        typer.Option(metavar="PART", help="Mesh part that keeps facing the viewer; repeatable."),
-    ] = None,
-    background: Annotated[
-        str, typer.Option(help="white, transparent or #rrggbb.")
-    ] = DEFAULT.background,
-    cell: Annotated[int, typer.Option(help="Side of a drawing's cell, px.")] = DEFAULT.cell_px,
-    columns: Annotated[int, typer.Option(help="Drawings in a row; 0 = all.")] = DEFAULT.columns,
     up: UpOption = "y",
     seed: SeedOption = 0,
     force: ForceFlag = False,
@@ -114,8 +65,7 @@ def synth(
     """
     chosen = CONDITIONS[condition]
     artist = replace(chosen.artist, body=chosen.artist.body.scaled(pose_difference))
-    given = {**_typed(context), "following_parts": tuple(following or ())}
-    options = replace(chosen, artist=artist, **given)
+    options = typed.over(replace(chosen, artist=artist))
     from toonset.dataset.mannequin.landmark_file import read_known_points
     from toonset.dataset.mesh.load import load_mesh
     from toonset.dataset.synthetic.files import write_turnaround
@@ -136,14 +86,3 @@ def synth(
     found = f"{counted(count, 'view')}, {counted(len(made.palette), 'colour')}"
     printer.say(f"{found}, sheet {width} x {height} px")
     printer.result({"folder": out, "views": count, "colors": len(made.palette)}, str(out))
-
-
-def _typed(context: typer.Context) -> dict[str, Any]:
-    """Return the options that were typed: what was not is the condition's."""
-    given = (name for name in FIELDS if _is_typed(context, name))
-    return {FIELDS[name]: context.params[name] for name in given}
-
-
-def _is_typed(context: typer.Context, name: str) -> bool:
-    source = context.get_parameter_source(name)
-    return source is not None and source.name not in ("DEFAULT", "DEFAULT_MAP")

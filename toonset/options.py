@@ -13,8 +13,10 @@ documentation, and `check_ranges` refuses what is out of range. Imports nothing 
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Iterator
 from dataclasses import Field, dataclass, fields
+from numbers import Integral, Real
 from types import UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -25,7 +27,7 @@ Symmetric = Literal["auto", "on", "off"]
 SYMMETRIC: tuple[Symmetric, ...] = get_args(Symmetric)
 
 AnyClass = TypeVar("AnyClass", bound=type)
-MOST_NUMBER = 2**63 - 1  # of an option without a bound of its own
+MOST_SEED = MOST_NUMBER = 2**63 - 1  # of an option without a bound of its own
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,8 @@ class Option:
     """What one option is for, in Python and on the command line.
 
     Attributes:
-        help: one or two sentences: meaning, unit, and the default where `None` stands for one.
+        help: one or two sentences: meaning, unit, and the default where `None` stands for one; of
+            a flag that switches off, what it does.
         flag: "": the field's name; "--budget"; "--lines/--no-lines"; "--no-fairing" of what is on
             without it; None: the command line does not have it.
         metavar: stands for the value in the help; "": its type.
@@ -77,14 +80,40 @@ class OptionField:
         return self.field.name
 
     @property
+    def is_off(self) -> bool:
+        """Return whether the flag, and the help, say what the option is without."""
+        return self.field.default is True and (self.option.flag or "").startswith("--no-")
+
+    @property
     def choices(self) -> tuple[str, ...]:
         """Return the values of an option that has a few; () of any other."""
         literals = (get_args(kind) for kind in self.kinds if get_origin(kind) is Literal)
         return tuple(value for values in literals for value in values)
 
 
-def fields_of(options: Any) -> Iterator[OptionField]:
-    """Yield the fields of a dataclass that say what they are for, in order."""
+def described(options: AnyClass) -> AnyClass:
+    """Read what the fields of a dataclass are for, and add it to the class's documentation."""
+    read = tuple(_read(options))
+    options.__option_fields__ = read  # type: ignore[attr-defined]
+    rows = "\n".join(f"    {one.name}: {_row(one)}" for one in read)
+    options.__doc__ = f"{inspect.getdoc(options) or ''}\n\nAttributes:\n{rows}\n"
+    call = vars(options)["__init__"]
+    call.__annotations__ = get_type_hints(call)  # what a notebook shows of the call
+    return options
+
+
+def fields_of(options: Any) -> tuple[OptionField, ...]:
+    """Return the fields of a dataclass, or of one of its kind, that say what they are for."""
+    found: tuple[OptionField, ...] = options.__option_fields__
+    return found
+
+
+def is_described(options: Any) -> bool:
+    """Return whether something is a class of options."""
+    return isinstance(options, type) and hasattr(options, "__option_fields__")
+
+
+def _read(options: Any) -> Iterator[OptionField]:
     hints = get_type_hints(options, include_extras=True)
     for field in fields(options):
         kind, *said = get_args(hints[field.name]) if _is_said(hints[field.name]) else (None,)
@@ -102,21 +131,16 @@ def _is_said(hint: Any) -> bool:
     return get_origin(hint) is Annotated
 
 
-def described(options: AnyClass) -> AnyClass:
-    """Add to the documentation of a class of options what its fields are for."""
-    rows = "\n".join(f"    {one.name}: {_row(one)}" for one in fields_of(options))
-    options.__doc__ = f"{(options.__doc__ or '').rstrip()}\n\nAttributes:\n{rows}\n"
-    return options
-
-
 def _row(one: OptionField) -> str:
     option = one.option
     said = [option.help]
-    if option.least is not None or option.most is not None:
-        ends = [] if option.least is None else [f"{option.least:g} at least"]
-        ends += [] if option.most is None else [f"{option.most:.15g} at most"]
-        said.append(", ".join(ends) + (", in degrees." if option.in_degrees else "."))
-    if option.flag:
+    ends = [end for end in (option.least, option.most) if end is not None and end < MOST_NUMBER]
+    if ends:
+        range_of = " to ".join(f"{end:.15g}" for end in ends) + " or more" * (len(ends) == 1)
+        said.append(f"{range_of}{', in degrees' * option.in_degrees}.")
+    if one.is_off:
+        said.append(f"That is what False does: {option.flag}.")
+    elif option.flag:
         said.append(f"Flag: {option.flag}.")
     return " ".join(said)
 
@@ -133,7 +157,7 @@ def check_ranges(options: Any, error: type[Exception] = UsageError, where: str =
         UsageError: or another `error`: a number out of range, a switch that is neither on nor off,
             or a word that is not one of the choices.
     """
-    for one in fields_of(type(options)):
+    for one in fields_of(options):
         value = getattr(options, one.name)
         if value is None and one.is_optional:
             continue
@@ -154,7 +178,7 @@ def _wrong(one: OptionField, value: Any) -> str | None:
         return None
     low = -MOST_NUMBER if option.least is None else option.least
     high = MOST_NUMBER if option.most is None else option.most
-    is_number = isinstance(value, int if one.kinds == (int,) else int | float)
+    is_number = isinstance(value, Integral if one.kinds == (int,) else Real)
     if is_number and low <= value <= high:  # NaN is in no range
         return None
     if option.least is None:

@@ -10,14 +10,15 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, is_dataclass, replace
+from dataclasses import dataclass, field, replace
+from enum import Enum, StrEnum
 from pathlib import Path
 from typing import Annotated, Any, Generic, TypeVar, get_args, get_origin, get_type_hints
 
 import typer
 
 from toonset.errors import did_you_mean
-from toonset.options import OptionField, fields_of
+from toonset.options import OptionField, fields_of, is_described
 
 Options = TypeVar("Options")
 NOT_TYPED = ("DEFAULT", "DEFAULT_MAP")  # where the value of a flag comes from otherwise
@@ -25,9 +26,15 @@ NOT_TYPED = ("DEFAULT", "DEFAULT_MAP")  # where the value of a flag comes from o
 
 @dataclass(frozen=True)
 class Given(Generic[Options]):
-    """The options that were typed, by field."""
+    """The options that were typed.
 
-    values: Mapping[str, Any]
+    Attributes:
+        kind: the dataclass that they are of.
+        values: by field.
+    """
+
+    kind: type[Options]
+    values: Mapping[str, Any] = field(default_factory=dict)
 
     def over(self, base: Options) -> Options:
         """Return other options with those that were typed in their places."""
@@ -83,8 +90,15 @@ def arguments_of(context: Any) -> dict[str, Any]:
             continue
         flags = [one for one in _flags_in(options) if not is_given or _is_typed(context, one.name)]
         own = {one.name: _value(one, values[one.name], context) for one in flags}
-        found[name] = Given(own) if is_given else options(**own)
+        found[name] = Given(options, own) if is_given else _checked(options(**own))
     return found
+
+
+def _checked(options: Any) -> Any:
+    """Return options that do not contradict each other."""
+    if hasattr(options, "check"):
+        options.check()
+    return options
 
 
 def each_of(arguments: Mapping[str, Any]) -> dict[str, Any]:
@@ -92,9 +106,9 @@ def each_of(arguments: Mapping[str, Any]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for name, value in arguments.items():
         if isinstance(value, Given):
-            found |= value.values
-        elif is_dataclass(value):
-            found |= {one.name: getattr(value, one.name) for one in fields_of(type(value))}
+            value = value.over(value.kind())
+        if is_described(type(value)):
+            found |= {one.name: getattr(value, one.name) for one in fields_of(value)}
         else:
             found[name] = value
     return found
@@ -108,7 +122,7 @@ def _options_in(hint: Any) -> tuple[Any, bool]:
     """Return the options that a parameter takes, None of another one; and if only typed ones."""
     is_given = get_origin(hint) is Given
     options = get_args(hint)[0] if is_given else hint
-    return (options, is_given) if is_dataclass(options) else (None, False)
+    return (options, is_given) if is_described(options) else (None, False)
 
 
 def _flags_in(options: Any) -> Iterable[OptionField]:
@@ -125,11 +139,6 @@ def flag_of(one: OptionField) -> str:
     return one.option.flag or f"--{one.name.replace('_', '-')}"
 
 
-def _is_off(one: OptionField) -> bool:
-    """Return whether the flag switches off what is on without it."""
-    return one.field.default is True and flag_of(one).startswith("--no-")
-
-
 def _parameter(one: OptionField) -> inspect.Parameter:
     """Return one option as a parameter that typer understands."""
     option, default, choices = one.option, one.field.default, "|".join(one.choices)
@@ -139,9 +148,10 @@ def _parameter(one: OptionField) -> inspect.Parameter:
         kind, default, complete = str | None, None, _completion(one.choices)
         metavar = metavar or f"<{choices}>,..."
     elif one.is_tuple:
-        kind, default = list[kind] | None, None
+        member: Any = _choice(one.choices) if choices else kind
+        kind, default = list[member] | None, None
         metavar = metavar or (f"<{choices}>" if choices else None)
-    elif _is_off(one):
+    elif one.is_off:
         default = False
     elif one.is_optional:
         kind = kind | None
@@ -161,13 +171,18 @@ def _parameter(one: OptionField) -> inspect.Parameter:
     )
 
 
+def _choice(names: tuple[str, ...]) -> Any:
+    """Return a type of a few names, which typer takes several of."""
+    return StrEnum("Choice", [(name, name) for name in names])
+
+
 def _value(one: OptionField, typed: Any, context: Any) -> Any:
     """Return the value of an option from what was typed, or from the parameter's default."""
     if one.option.listed:
         return _names(one, typed or "", context)
     if one.is_tuple:
-        return tuple(typed or ())
-    if _is_off(one):
+        return tuple(value.value if isinstance(value, Enum) else value for value in typed or ())
+    if one.is_off:
         return not typed
     return math.radians(typed) if one.option.in_degrees and typed is not None else typed
 

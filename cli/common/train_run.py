@@ -12,6 +12,7 @@ from toonset.cli.common.host import keep_freed_memory
 from toonset.cli.common.output import Printer
 from toonset.cli.common.train_summary import summary
 from toonset.cli.common.train_watch import Stopper, TrainPrinter
+from toonset.nerf.options import TrainOptions
 from toonset.write import check_output
 
 DOUBTFUL = 3  # exit code: written, but weak (--strict), or training was cut short
@@ -27,7 +28,7 @@ class Request:
         bundle: what to train on.
         test: held-out views; None: none.
         run: the folder to write.
-        options: of training, those that were given.
+        options: of training.
         threads: of the CPU; None: the usual number.
         preview_every: seconds; None: no previews.
         force: replace an earlier run.
@@ -38,7 +39,7 @@ class Request:
     bundle: Path
     test: Path | None
     run: Path
-    options: dict[str, Any]
+    options: TrainOptions
     threads: int | None
     preview_every: float | None
     force: bool
@@ -55,7 +56,6 @@ def run(request: Request, printer: Printer) -> int:
     """Train, write the run and print the result; return the exit code."""
     from toonset.dataset.bundle.bundle import failed_cameras
     from toonset.dataset.bundle.read_scene import read_scene
-    from toonset.nerf.options import TrainOptions
     from toonset.nerf.run.folder import WRITTEN
     from toonset.nerf.run.monitor import INTERRUPTED, MonitorOptions
     from toonset.nerf.training import train
@@ -74,7 +74,7 @@ def run(request: Request, printer: Printer) -> int:
     with stopper.listening():
         found = train(
             scene,
-            TrainOptions(**request.options),
+            request.options,
             palette=request.palette,
             threads=request.threads,
             test=test,

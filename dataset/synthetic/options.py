@@ -4,60 +4,100 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
+from typing import Annotated
 
-from toonset.dataset.synthetic.artist_options import (
-    ArtistOptions,
-    BodyErrors,
-    Brushwork,
-    check_ranges,
-)
+from toonset.dataset.synthetic.artist_options import ArtistOptions, BodyErrors, Brushwork
 from toonset.dataset.synthetic.directions import MOST_OF_HALF, Turn
 from toonset.errors import SheetError
+from toonset.options import Option, check_ranges, described
 
 MAX_SAMPLES = 4096  # px a side of a supersampled cell: what off-screen buffers hold in < 1 GiB
 HEX_COLOR = re.compile(r"#?[0-9a-fA-F]{6}")
 
 
+@described
 @dataclass(frozen=True)
 class SynthOptions:
-    """Options of `toonset.dataset.synthetic.turnaround.make_turnaround`.
+    """How a turnaround of a mesh is drawn."""
 
-    Attributes:
-        views: drawings; 8 is the usual turnaround.
-        turn: which directions they show (`directions`); unless it is even, the seed says whether
-            the character's left or right side is drawn first.
-        cell_px: width and height of one drawing's cell; 300 shows every colour of a character.
-        columns: drawings in a row of the sheet; 0 = all in one row, as artists mostly draw.
-        yaw_jitter_deg: each view is turned too far or too little by up to this; front and back
-            of a half turn are not.
-        elevation_deg: all cameras look down by this; 0 is the drawing board's view.
-        distance_heights: camera distance in body heights; 0 = orthographic, as sheets mostly are.
-        outline_px: width of the silhouette's black line, 0 = no lines; inner lines are 0.6 of it.
-            2.5 is about 1 % of a 300 px cell, a usual brush.
-        label_lines: draw inner lines between colours, too, not only at depth jumps.
-        warp_percent: root mean square of the smooth drawing error over the figure, in percent of
-            the cell; 0 is perfect, 0.5 to 1.5 are careful hands.
-        scale_error_percent: each view is drawn larger or smaller by up to this.
-        following_parts: mesh parts that keep facing the viewer (the ears of a famous mouse).
-        background: "white", "transparent" or a colour such as "#aabbcc"; artists export white.
-        supersample: samples per pixel and axis for anti-aliasing; 3 gives 10 levels or more.
-        artist: what artists do besides: other bodies, shadow, paper.
-    """
-
-    views: int = 8
-    turn: Turn = "even"
-    cell_px: int = 300
-    columns: int = 0
-    yaw_jitter_deg: float = 0.0
-    elevation_deg: float = 0.0
-    distance_heights: float = 0.0
-    outline_px: float = 2.5
-    label_lines: bool = True
-    warp_percent: float = 0.0
-    scale_error_percent: float = 0.0
-    following_parts: tuple[str, ...] = ()
-    background: str = "white"
-    supersample: int = 3
+    views: Annotated[
+        int,
+        Option(
+            "Drawings, evenly round; studio (4, at most 8): front, back, side, 3/4 first.",
+            least=1,
+            most=360,
+        ),
+    ] = 8  # the usual turnaround
+    turn: Annotated[
+        Turn,
+        Option(
+            "Which directions they show (`directions`); unless it is even, the seed says whether "
+            "the character's left or right side is drawn first.",
+            flag=None,
+        ),
+    ] = "even"
+    cell_px: Annotated[
+        int, Option("Side of a drawing's cell, px.", flag="--cell", least=16, most=MAX_SAMPLES)
+    ] = 300  # shows every colour of a character
+    columns: Annotated[int, Option("Drawings in a row; 0 = all.", least=0)] = 0
+    yaw_jitter_deg: Annotated[
+        float,
+        Option(
+            "Each view is turned wrongly by up to this, degrees.",
+            flag="--yaw-jitter",
+            least=0,
+            most=180,
+        ),
+    ] = 0.0
+    elevation_deg: Annotated[
+        float, Option("Cameras look down by this, degrees.", flag="--elevation", least=-89, most=89)
+    ] = 0.0
+    distance_heights: Annotated[
+        float,
+        Option(
+            "Camera distance in body heights; 0 = orthographic.",
+            flag="--distance",
+            least=0,
+            most=1e6,
+        ),
+    ] = 0.0
+    outline_px: Annotated[
+        float, Option("Width of the black outline, px; 0 = none.", flag="--outline", least=0)
+    ] = 2.5  # about 1 % of a 300 px cell, a usual brush; inner lines are 0.6 of it
+    label_lines: Annotated[
+        bool, Option("Draw lines between colours, too.", flag="--label-lines/--no-label-lines")
+    ] = True
+    warp_percent: Annotated[
+        float,
+        Option("Smooth drawing error (rms), percent of the cell.", flag="--warp", least=0, most=5),
+    ] = 0.0  # 0.5 to 1.5 are careful hands
+    scale_error_percent: Annotated[
+        float,
+        Option(
+            "Each view is larger or smaller by up to this, percent.",
+            flag="--scale-error",
+            least=0,
+            most=50,
+        ),
+    ] = 0.0
+    following_parts: Annotated[
+        tuple[str, ...],
+        Option(
+            "Mesh part that keeps facing the viewer; repeatable.",
+            flag="--following",
+            metavar="PART",
+        ),
+    ] = ()
+    background: Annotated[str, Option("white, transparent or #rrggbb.")] = "white"
+    supersample: Annotated[
+        int,
+        Option(
+            "Samples per pixel and axis for anti-aliasing; 3 gives 10 levels or more.",
+            flag=None,
+            least=1,
+            most=16,
+        ),
+    ] = 3
     artist: ArtistOptions = ArtistOptions()
 
     def __post_init__(self) -> None:
@@ -67,19 +107,17 @@ class SynthOptions:
             SheetError: a number is out of its range, the background is not a colour, or there is no
                 paper for what would be on it.
         """
-        limits = {
-            "views": (1, MOST_OF_HALF if self.turn == "half" else 360),
-            "cell_px": (16, MAX_SAMPLES // max(self.supersample, 1)),
-            "columns": (0, self.views),
-            "yaw_jitter_deg": (0, 180),
-            "elevation_deg": (-89, 89),
-            "distance_heights": (0, 1e6),
-            "outline_px": (0, self.cell_px / 10),
-            "warp_percent": (0, 5),
-            "scale_error_percent": (0, 50),
-            "supersample": (1, 16),
+        check_ranges(self, SheetError, "synth: ")
+        most = {
+            "views": MOST_OF_HALF if self.turn == "half" else self.views,
+            "cell_px": MAX_SAMPLES // self.supersample,
+            "columns": self.views,
+            "outline_px": self.cell_px / 10,
         }
-        check_ranges(self, limits)
+        for name, limit in most.items():
+            if getattr(self, name) > limit:
+                said = f"synth: {name}: {getattr(self, name)} is out of range"
+                raise SheetError(f"{said}; {limit:g} is the most with the other options")
         if self.background not in ("white", "transparent") and not HEX_COLOR.fullmatch(
             self.background
         ):

@@ -16,7 +16,7 @@ from skimage.measure import marching_cubes
 
 from toonset.errors import UsageError
 from toonset.nerf.fields.trained_field import TrainedField
-from toonset.nerf.options import FACES
+from toonset.nerf.options import FEWEST_FACES, MeshOptions
 from toonset.nerf.surface.color import label_probabilities
 from toonset.nerf.surface.cut import cut
 from toonset.nerf.surface.decimate import decimate
@@ -24,13 +24,12 @@ from toonset.nerf.surface.files import Surface, Variant
 from toonset.nerf.surface.solid import SOLID_FROM, Solid, solid_of
 
 ROUNDS = 2  # of averaging colours over neighbours: specks go, borders come out smooth
-FEWEST = 100  # triangles that show any figure
 FINER = 4  # times as many faces as wanted are enough to choose from
 
 
 def surface_of(
     trained: TrainedField,
-    faces: int | None = FACES,
+    faces: int | None = MeshOptions.faces,
     progress: Callable[[str, float], None] = lambda step, done: None,
     *,
     variants: Sequence[tuple[str, TrainedField]] = (),
@@ -48,8 +47,8 @@ def surface_of(
         PaletteError: the run was trained without palette.
         UsageError: fewer than 100 triangles asked for.
     """
-    if faces is not None and faces < FEWEST:
-        raise UsageError(f"faces: {faces}; {FEWEST} or more are needed to close a figure")
+    if faces is not None and faces < FEWEST_FACES:
+        raise UsageError(f"faces: {faces}; {FEWEST_FACES} or more are needed to close a figure")
     solid = solid_of(trained, partial(progress, "finding the surface"))
     vertices, corners = _triangles(solid)
     rounds = ROUNDS

@@ -17,7 +17,7 @@ from toonset.dataset.mesh.rasterize import depth_map
 from toonset.errors import BundleError
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.look.drawings import Drawings, Places, sample_picture
-from toonset.nerf.options import FACES
+from toonset.nerf.options import MeshOptions
 from toonset.nerf.surface.choose import chosen, merits
 from toonset.nerf.surface.files import Surface
 from toonset.nerf.surface.paint import Paint, paint_of
@@ -42,7 +42,7 @@ NO_OUTLINE = "run: its drawings have no outline; leave --outline out"
 
 def texture_surface(
     trained: TrainedField,
-    faces: int | None = FACES,
+    faces: int | None = MeshOptions.faces,
     progress: Callable[[str, float], None] = lambda step, done: None,
     *,
     outline: bool = False,

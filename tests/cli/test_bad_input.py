@@ -66,7 +66,7 @@ def test_a_bad_mesh(name, drawn: Path, toonset, snapshot, tmp_path, monkeypatch)
     [
         (
             ["synth", "mannequin.obj", "--views", "0", "-o", "x"],
-            "views is 0, 1 to 360 is needed; change it",
+            "Invalid value for '--views': Input should be greater than or equal to 1",
         ),
         (
             ["palette", "sheet.png", "--keep", "x"],

@@ -11,7 +11,7 @@ import pytest
 from toonset.cli.common import output
 from toonset.dataset.mesh.load import load_mesh
 from toonset.errors import PaletteError
-from toonset.nerf.options import FACES
+from toonset.nerf.options import MeshOptions
 from toonset.nerf.surface import texture
 
 
@@ -56,7 +56,7 @@ def test_blender_gets_the_painted_body(
     assert done.code == 0, done
     body = load_mesh(tmp_path / "own" / "body.glb")
     mannequin = load_mesh(tmp_path / "own" / "mannequin.obj")
-    assert len(body.faces) <= FACES
+    assert len(body.faces) <= MeshOptions.faces
     assert abs(body.height / mannequin.height - 1) < 0.1  # one world
     given = tmp_path / "own" / "body.glb"
     assert toonset(*asked, tmp_path / "given", "--body", given).code == 0

@@ -3,6 +3,7 @@
 import json
 import shutil
 import signal
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ import torch
 
 from toonset.cli.common.refusals import RENAMED
 from toonset.cli.common.train_watch import LOG_S, RateLimit, Stopper
+from toonset.nerf.options import TrainOptions
 from toonset.nerf.score.between import VIEWS
 
 FAST = ("--steps", 12, "--threads", 1, "--device", "cpu")
@@ -168,7 +170,7 @@ def test_a_switch_of_before_names_the_one_of_now(toonset) -> None:
 
 
 def test_every_switch_switches_its_option(toonset, monkeypatch) -> None:
-    asked: list[dict[str, object]] = []
+    asked: list[TrainOptions] = []
     monkeypatch.setattr("toonset.cli.train.run", lambda request, _: asked.append(request.options))
     switches = {
         ("--no-fairing",): {"fairing": False},
@@ -179,4 +181,4 @@ def test_every_switch_switches_its_option(toonset, monkeypatch) -> None:
     for words in ((), *switches):
         assert toonset("train", *words).code == 0
     default = asked[0]
-    assert asked[1:] == [default | changed for changed in switches.values()]
+    assert asked[1:] == [replace(default, **changed) for changed in switches.values()]

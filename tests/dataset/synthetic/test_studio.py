@@ -134,7 +134,7 @@ def test_same_seed_same_bytes(body: Mesh, made: Turnaround, tmp_path: Path, snap
 
 
 def test_what_a_studio_cannot_draw_is_refused() -> None:
-    with pytest.raises(SheetError, match="views is 9, 1 to 8 is needed"):
+    with pytest.raises(SheetError, match="views: 9 is out of range; 8 is the most"):
         replace(SMALL, views=9)
     with pytest.raises(SheetError, match="need paper, the background is transparent"):
         replace(SMALL, background="transparent")
@@ -159,5 +159,5 @@ def test_the_command_draws_a_studios_sheet(tmp_path, monkeypatch, toonset, body)
     for wrong in (("--views", 9), ("--pose-difference", -1), ("--pose-difference", 50)):
         refused = toonset(*asked, *wrong, "-o", "no")
         assert refused.code == 2
-        assert "is needed; change it" in refused.reason
+        assert "is out of range; " in refused.reason
     assert not Path("no").exists()

@@ -189,9 +189,9 @@ def test_unknown_part_names_those_there_are() -> None:
 
 
 def test_options_out_of_range_are_refused() -> None:
-    with pytest.raises(SheetError, match="views is 0"):
+    with pytest.raises(SheetError, match="views: 0 is out of range; 1 is the least, 360 the most"):
         SynthOptions(views=0)
-    with pytest.raises(SheetError, match="warp_percent is nan"):
+    with pytest.raises(SheetError, match="warp_percent: nan"):
         SynthOptions(warp_percent=math.nan)
     with pytest.raises(SheetError, match="background 'blueish'"):
         SynthOptions(background="blueish")

@@ -22,7 +22,7 @@ from toonset.nerf.hull.hull import Hull
 from toonset.nerf.kernels.compositing import composite_even, composite_packed
 from toonset.nerf.kernels.interpolation import apply_once
 from toonset.nerf.kernels.loss_terms import photometric
-from toonset.nerf.options import PRESETS, TrainOptions, preset
+from toonset.nerf.options import PRESETS, TrainOptions
 from toonset.nerf.train.box_rays import (
     BINS,
     CLEARER,
@@ -212,5 +212,5 @@ def test_rays_see_through_the_whole_box_at_first(build: Callable[[], Field]) -> 
 
 
 def test_presets_are_options() -> None:
-    assert [TrainOptions(**preset(name)).carve for name in PRESETS] == [True, False]
-    assert preset("fast") == {}
+    assert [made().carve for made in PRESETS.values()] == [True, False]
+    assert PRESETS["fast"]() == TrainOptions()
