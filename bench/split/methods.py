@@ -13,7 +13,7 @@ from jaxtyping import Bool, UInt8
 
 from bench.split.cases import Drawn, drawn_at
 from toonset.dataset.split.corrections import CORRECTIONS
-from toonset.dataset.split.sheet import SheetOptions, split_picture
+from toonset.dataset.split.sheet import PictureOptions, split_picture
 from toonset.errors import ToonsetError
 from toonset.view import Box
 
@@ -39,7 +39,7 @@ def by_toonset(rgba: UInt8[np.ndarray, "height width 4"], *without: str) -> Foun
     """Return what `split_picture` finds without some corrections; a refusal is a warning."""
     start = time.process_time()
     try:
-        sheet = split_picture(rgba, SheetOptions(without=without))
+        sheet = split_picture(rgba, PictureOptions(without=without))
     except ToonsetError:
         return Found((), True, (), time.process_time() - start)
     seconds = time.process_time() - start

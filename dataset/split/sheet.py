@@ -57,7 +57,7 @@ NAMES = {
 
 
 @dataclass(frozen=True)
-class SheetOptions:
+class PictureOptions:
     """Options of splitting a sheet.
 
     Attributes:
@@ -156,19 +156,19 @@ class Segmentation:
 
 
 def split_picture(
-    rgba: UInt8[np.ndarray, "height width 4"], options: SheetOptions | None = None
+    rgba: UInt8[np.ndarray, "height width 4"], options: PictureOptions | None = None
 ) -> Segmentation:
     """Return the views of a sheet.
 
     Args:
         rgba: the picture; a single figure is fine.
-        options: see `SheetOptions`.
+        options: see `PictureOptions`.
 
     Raises:
         SheetError: blank, no plain background, nothing on it large enough, far too many figures, or
             no correction of that name to leave out.
     """
-    options = options or SheetOptions()
+    options = options or PictureOptions()
     by_hand = bool(options.boxes) or options.grid is not None
     blocks = None if by_hand else find_grid(rgba)
     if blocks is not None:
@@ -244,7 +244,7 @@ def _enlarged(found: Segmentation, blocks: Grid) -> Segmentation:
     )
 
 
-def _check(found: SheetLayout, ground: Background, options: SheetOptions) -> None:
+def _check(found: SheetLayout, ground: Background, options: PictureOptions) -> None:
     color = "transparent" if ground.rgb is None else "#{:02x}{:02x}{:02x}".format(*ground.rgb)
     blobs = found.blobs
     if not len(blobs.areas):
@@ -264,7 +264,7 @@ def _check(found: SheetLayout, ground: Background, options: SheetOptions) -> Non
 
 
 def _crops(
-    found: SheetLayout, paint: Bool[np.ndarray, "height width"], options: SheetOptions
+    found: SheetLayout, paint: Bool[np.ndarray, "height width"], options: PictureOptions
 ) -> list[Crop]:
     if options.boxes:
         return boxed_crops(found, paint, options.boxes, options.margin_px)
@@ -279,7 +279,7 @@ def _window(picture: np.ndarray, box: Box) -> np.ndarray:
 
 
 def _views(
-    rgba: np.ndarray, ground: Background, crops: list[Crop], options: SheetOptions
+    rgba: np.ndarray, ground: Background, crops: list[Crop], options: PictureOptions
 ) -> tuple[list[View], int, int]:
     """Return the views, the number of opened holes, and how many views were given paper."""
     holes, papered = 0, 0

@@ -23,7 +23,7 @@ from toonset.dataset.images.picture import decode_rgba
 from toonset.dataset.split.captions import with_captions
 from toonset.dataset.split.figures.rows import Taken
 from toonset.dataset.split.pages import straightened
-from toonset.dataset.split.sheet import Segmentation, SheetOptions, split_picture
+from toonset.dataset.split.sheet import PictureOptions, Segmentation, split_picture
 from toonset.dataset.split_folder.boxes import check_boxes, read_boxes
 from toonset.dataset.split_folder.checks import odd_files
 from toonset.dataset.split_folder.corrected import Given
@@ -217,7 +217,7 @@ def _with_origin(sheet: Sheet) -> Sheet:
     return replace(sheet, split=replace(split, views=views))
 
 
-def _options_per_sheet(places: Sequence[Path], cutting: Cutting) -> list[SheetOptions | None]:
+def _options_per_sheet(places: Sequence[Path], cutting: Cutting) -> list[PictureOptions | None]:
     """Return how every sheet is cut; None for a split folder, which is cut already."""
     is_cut = [place.is_dir() for place in places]
     if cutting.given and any(is_cut):
@@ -225,7 +225,7 @@ def _options_per_sheet(places: Sequence[Path], cutting: Cutting) -> list[SheetOp
         raise SheetError(
             f"{cutting.given[0]}: {folder} is cut already; give the sheet that it was cut from"
         )
-    common = SheetOptions(
+    common = PictureOptions(
         background_rgb=cutting.background_rgb, grid=cutting.cells, taken=cutting.taken
     )
     options = [None if cut else common for cut in is_cut]
@@ -241,8 +241,8 @@ def _options_per_sheet(places: Sequence[Path], cutting: Cutting) -> list[SheetOp
 
 
 def _as_corrected(
-    places: Sequence[Path], options: Sequence[SheetOptions | None], given: Given
-) -> list[SheetOptions | None]:
+    places: Sequence[Path], options: Sequence[PictureOptions | None], given: Given
+) -> list[PictureOptions | None]:
     """Return how every sheet is cut, the corrected one as its corrections say."""
     said, found = given.content, list(options)
     if not (said.figures_key or said.background):
@@ -273,7 +273,7 @@ def _of_split_folder(folder: Path) -> Sheet:
 
 
 def _of_sheet(
-    path: Path, options: SheetOptions, where: str, network: MattingNetwork | None, *, told: bool
+    path: Path, options: PictureOptions, where: str, network: MattingNetwork | None, *, told: bool
 ) -> Sheet:
     """Return the views of one file; `told`: a person said which figures are wanted."""
     data = read_whole(path, "picture", PictureError)

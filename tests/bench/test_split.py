@@ -14,7 +14,7 @@ from bench.split.measure import bench_split
 from bench.split.methods import METHODS, Found, by_corner_color, by_toonset
 from bench.split.score import mask_iou, same_box, score
 from toonset.dataset.images.picture import encode_png
-from toonset.dataset.split.sheet import LeftOut, Segmentation, SheetOptions
+from toonset.dataset.split.sheet import LeftOut, PictureOptions, Segmentation
 from toonset.errors import BundleError, SheetError
 from toonset.view import View
 
@@ -119,7 +119,7 @@ def test_our_views_keep_their_place_and_a_refusal_is_a_warning(
     assert [figure.box for figure in result.figures] == [(10, 10, 60, 40)]
     assert (result.warned, result.left_out) == (True, ((1, 2, 3, 4),))
 
-    def refuse(rgba: np.ndarray, options: SheetOptions) -> Segmentation:
+    def refuse(rgba: np.ndarray, options: PictureOptions) -> Segmentation:
         raise SheetError("blank")
 
     monkeypatch.setattr("bench.split.methods.split_picture", refuse)

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from tests.cli.split_sheets import COLORS, COUNT, HIGH, PITCH, TOP, WIDE, drawn_sheet
-from toonset.dataset.split.sheet import SheetOptions, split_picture
+from toonset.dataset.split.sheet import PictureOptions, split_picture
 from toonset.dataset.split_folder.read import read_split
 from toonset.dataset.split_folder.write import NAME, VERSION
 
@@ -121,13 +121,13 @@ def test_numbers_to_drop_may_be_written_in_several_ways(text, sheet: Path, toons
 
 
 @pytest.fixture
-def asked(monkeypatch: pytest.MonkeyPatch) -> list[SheetOptions]:
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[PictureOptions]:
     """Return with which options sheets are split, while they are."""
-    seen: list[SheetOptions] = []
+    seen: list[PictureOptions] = []
 
     def spy(rgba, options):
         seen.append(options)
-        return split_picture(rgba, SheetOptions())
+        return split_picture(rgba, PictureOptions())
 
     monkeypatch.setattr("toonset.dataset.split_folder.load.split_picture", spy)
     return seen
@@ -146,9 +146,9 @@ def test_what_is_typed_reaches_the_splitter(sheet: Path, toonset, asked):
     ]
     assert [len(boxes) for boxes in of_sheet] == [3, 2]
     assert asked == [
-        *(SheetOptions(),) * 2,
-        *(SheetOptions(boxes=of, background_rgb=(255, 255, 255)) for of in of_sheet),
-        SheetOptions(grid=(4, 1), background_rgb=(0, 255, 16)),
+        *(PictureOptions(),) * 2,
+        *(PictureOptions(boxes=of, background_rgb=(255, 255, 255)) for of in of_sheet),
+        PictureOptions(grid=(4, 1), background_rgb=(0, 255, 16)),
     ]
 
 

@@ -23,7 +23,7 @@ from toonset.dataset.images.picture import decode_rgba, encode_png, picture_size
 from toonset.dataset.importers.detect import read_import
 from toonset.dataset.mannequin.landmark_file import read_landmarks
 from toonset.dataset.mesh.load import load_mesh
-from toonset.dataset.split.sheet import SheetOptions, split_picture
+from toonset.dataset.split.sheet import PictureOptions, split_picture
 from toonset.dataset.split_folder.boxes import read_boxes
 from toonset.dataset.split_folder.corrections import read_corrections
 from toonset.dataset.split_folder.write import read_records
@@ -52,7 +52,7 @@ def sheet(data: bytes, folder: Path) -> None:
     columns = data[2] % 8 if len(data) > 2 else 0
     grid = (columns, 1 + data[2] // 128) if columns > 4 else None
     with contextlib.suppress(ToonsetError):
-        split_picture(drawn(data), SheetOptions(grid=grid))
+        split_picture(drawn(data), PictureOptions(grid=grid))
 
 
 def drawn(data: bytes) -> np.ndarray:

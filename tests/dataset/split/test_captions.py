@@ -10,7 +10,7 @@ import pytest
 from toonset.dataset.images.picture import encode_png
 from toonset.dataset.split import captions
 from toonset.dataset.split.captions import Text, caption_labels, label_of, with_captions
-from toonset.dataset.split.sheet import SheetOptions, split_picture
+from toonset.dataset.split.sheet import PictureOptions, split_picture
 from toonset.dataset.split_folder.load import split_sheet
 from toonset.dataset.split_folder.overlay import draw_sheet
 from toonset.dataset.split_folder.read import read_split
@@ -136,7 +136,7 @@ def test_a_large_sheet_is_read_smaller(reader):
 
 
 def test_boxes_given_by_hand_have_captions(reader):
-    boxes = SheetOptions(boxes=((30, 45, 80, 210), (160, 45, 80, 210), (290, 45, 80, 210)))
+    boxes = PictureOptions(boxes=((30, 45, 80, 210), (160, 45, 80, 210), (290, 45, 80, 210)))
     assert [view.caption for view in read(sheet_of_three(), boxes).views] == [
         "front",
         "side",

@@ -4,7 +4,7 @@ import pytest
 
 from bench.messy.sheet import make_messy_sheet
 from toonset.dataset.split.corrections import CORRECTIONS
-from toonset.dataset.split.sheet import SheetOptions, split_picture
+from toonset.dataset.split.sheet import PictureOptions, split_picture
 from toonset.errors import SheetError
 
 
@@ -17,14 +17,14 @@ def test_a_sheet_that_needs_a_correction_misses_it(
 ) -> None:
     sheet = make_messy_sheet(seed, [difficulty])
     boxes = [view.box for view in split_picture(sheet.rgba).views]
-    without = split_picture(sheet.rgba, SheetOptions(without=(correction,)))
+    without = split_picture(sheet.rgba, PictureOptions(without=(correction,)))
     assert len(boxes) == len(sheet.boxes)
     assert [view.box for view in without.views] != boxes
 
 
 def test_a_plain_sheet_needs_none() -> None:
     rgba = make_messy_sheet(0, ["plain"]).rgba
-    bare = split_picture(rgba, SheetOptions(without=tuple(CORRECTIONS)))
+    bare = split_picture(rgba, PictureOptions(without=tuple(CORRECTIONS)))
     assert [view.box for view in bare.views] == [view.box for view in split_picture(rgba).views]
 
 
@@ -33,4 +33,4 @@ def test_a_correction_that_is_none_is_refused() -> None:
     with pytest.raises(
         SheetError, match="no correction 'shade'; choose from frames, open outlines, shadows"
     ):
-        split_picture(rgba, SheetOptions(without=("shade",)))
+        split_picture(rgba, PictureOptions(without=("shade",)))

@@ -9,7 +9,7 @@ from bench.messy.options import DIFFICULTIES
 from bench.messy.sheet import make_messy_sheet
 from toonset.dataset.split import segment
 from toonset.dataset.split.background import find_background
-from toonset.dataset.split.sheet import Segmentation, SheetOptions, split_picture
+from toonset.dataset.split.sheet import PictureOptions, Segmentation, split_picture
 from toonset.dataset.synthetic.options import SynthOptions
 from toonset.dataset.synthetic.turnaround import make_turnaround
 from toonset.errors import SheetError
@@ -79,7 +79,7 @@ def test_hand_in_hand_is_cut_between_the_hands() -> None:
     assert abs(figure_boxes(sheet)[0][0] + figure_boxes(sheet)[0][2] - 125) <= 3
     assert sheet.warnings == ()  # both halves look like the third figure: no doubt
     assert "touching figures were cut apart (1)" in sheet.remarks
-    by_hand = SheetOptions(boxes=((30, 0, 95, 200), (125, 0, 95, 200)))
+    by_hand = PictureOptions(boxes=((30, 0, 95, 200), (125, 0, 95, 200)))
     assert not any("cut apart" in said for said in split_picture(opaque(picture), by_hand).remarks)
 
 
@@ -130,24 +130,24 @@ def test_boxes_by_hand_are_cut_in_their_order() -> None:
     person(picture, 100)
     person(picture, 300)
     boxes = ((240, 2, 120, 190), (40, 2, 120, 190))
-    sheet = split_picture(opaque(picture), SheetOptions(boxes=boxes))
+    sheet = split_picture(opaque(picture), PictureOptions(boxes=boxes))
     assert figure_boxes(sheet) == figure_boxes(split_picture(opaque(picture)))[::-1]
     assert sheet.left_out == ()
     with pytest.raises(SheetError, match=r"box 0 \(5, 5, 20, 20\) holds background only"):
-        split_picture(opaque(picture), SheetOptions(boxes=((5, 5, 20, 20),)))
+        split_picture(opaque(picture), PictureOptions(boxes=((5, 5, 20, 20),)))
     with pytest.raises(SheetError, match="does not lie on the sheet"):
-        split_picture(opaque(picture), SheetOptions(boxes=((300, 5, 200, 20),)))
+        split_picture(opaque(picture), PictureOptions(boxes=((300, 5, 200, 20),)))
 
 
 def test_a_grid_has_one_view_per_cell_that_is_not_empty() -> None:
     picture = paper(400, 200)
     person(picture, 50)
     cv2.circle(picture, (250, 100), 9, RED, -1)  # much smaller: no figure without the grid
-    sheet = split_picture(opaque(picture), SheetOptions(grid=(4, 1)))
+    sheet = split_picture(opaque(picture), PictureOptions(grid=(4, 1)))
     assert figure_boxes(sheet)[1] == (241, 91, 19, 19)
     assert len(split_picture(opaque(picture)).views) == 1
     with pytest.raises(SheetError, match="a grid of 500 x 1 cells on 400 x 200 px; use fewer"):
-        split_picture(opaque(picture), SheetOptions(grid=(500, 1)))
+        split_picture(opaque(picture), PictureOptions(grid=(500, 1)))
 
 
 def test_white_clothes_are_no_holes_and_gaps_behind_arms_are() -> None:

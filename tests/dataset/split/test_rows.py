@@ -8,7 +8,7 @@ from bench.messy.sheet import MessySheet, make_messy_sheet
 from tests.dataset.split.test_messy_sheets import iou
 from toonset.dataset.split.figures.blobs import find_blobs
 from toonset.dataset.split.figures.rows import Taken, find_groups
-from toonset.dataset.split.sheet import Segmentation, SheetOptions, split_picture
+from toonset.dataset.split.sheet import PictureOptions, Segmentation, split_picture
 from toonset.errors import SheetError
 
 SEEDS = range(3)
@@ -32,7 +32,7 @@ def test_poses_are_listed_and_can_be_taken() -> None:
     first = split_picture(messy.rgba)
     assert [group.taken for group in first.groups] == [True, False]
     assert first.groups[0].likely == 1 > first.groups[1].likely
-    second = split_picture(messy.rgba, SheetOptions(taken=Taken(group=1)))
+    second = split_picture(messy.rgba, PictureOptions(taken=Taken(group=1)))
     poses = [box for row in first.groups[1].rows for box in row]
     assert len(second.views) == len(poses)
     assert second.groups[1].taken
@@ -48,9 +48,9 @@ def test_another_group_is_announced_only_where_it_is_nearly_as_likely() -> None:
 def test_a_group_that_is_not_there_is_refused() -> None:
     messy = make_messy_sheet(4100, ("plain",))
     with pytest.raises(SheetError, match="no such group: the sheet has 1"):
-        split_picture(messy.rgba, SheetOptions(taken=Taken(group=1)))
+        split_picture(messy.rgba, PictureOptions(taken=Taken(group=1)))
     with pytest.raises(SheetError, match="no such outfit: the group has one row"):
-        split_picture(messy.rgba, SheetOptions(taken=Taken(outfit=1)))
+        split_picture(messy.rgba, PictureOptions(taken=Taken(outfit=1)))
 
 
 def test_rows_in_other_clothes_are_outfits_and_a_row_can_be_taken() -> None:
@@ -59,7 +59,7 @@ def test_rows_in_other_clothes_are_outfits_and_a_row_can_be_taken() -> None:
     assert whole.groups[0].outfits
     assert any("--outfit" in remark for remark in whole.remarks)
     rows = whole.groups[0].rows
-    second = split_picture(messy.rgba, SheetOptions(taken=Taken(outfit=1)))
+    second = split_picture(messy.rgba, PictureOptions(taken=Taken(outfit=1)))
     assert [view.figure_box for view in second.views] == list(rows[1])
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from toonset.dataset.split.sheet import Segmentation, SheetOptions, split_picture
+from toonset.dataset.split.sheet import PictureOptions, Segmentation, split_picture
 from toonset.errors import SheetError
 
 WHITE = (255, 255, 255)
@@ -315,4 +315,4 @@ def test_too_many_figures_are_refused() -> None:
             picture[row : row + 10, column : column + 10, :3] = 0
     with pytest.raises(SheetError, match="found 121 figures, at most 64"):
         split_picture(picture)
-    assert len(split_picture(picture, SheetOptions(most_figures=200)).views) == 121
+    assert len(split_picture(picture, PictureOptions(most_figures=200)).views) == 121

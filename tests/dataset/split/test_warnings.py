@@ -10,7 +10,7 @@ from bench.messy.sheet import make_messy_sheet
 from toonset.dataset.split.background import find_background
 from toonset.dataset.split.figures.rows import LIKELIEST, Taken
 from toonset.dataset.split.segment import find_layout, find_paint
-from toonset.dataset.split.sheet import SheetOptions, split_picture
+from toonset.dataset.split.sheet import PictureOptions, split_picture
 from toonset.dataset.split.warnings import border_warnings
 
 
@@ -211,7 +211,7 @@ def test_two_figures_in_one_view_have_two_heads_and_ears_are_none() -> None:
         cv2.circle(page, (x, 80), 55, (230, 190, 160, 255), -1)
         page[120:350, x - 40 : x + 40] = (200, 40, 40, 255)
         page[150:330, x - 70 : x + 71] = (200, 40, 40, 255)
-    told = split_picture(page, SheetOptions(without=("touching figures",))).warnings
+    told = split_picture(page, PictureOptions(without=("touching figures",))).warnings
     assert any("two heads" in line for line in told)
     rabbit = np.full((400, 400, 4), 255, np.uint8)
     for x in (150, 240):
@@ -244,5 +244,5 @@ def test_rows_that_a_person_did_not_choose_are_no_views_left_out(seed: int) -> N
     messy = make_messy_sheet(seed, ("outfits",))
     whole = split_picture(messy.rgba)
     assert whole.groups[0].outfits
-    row = split_picture(messy.rgba, SheetOptions(taken=Taken(0, 1)))
+    row = split_picture(messy.rgba, PictureOptions(taken=Taken(0, 1)))
     assert not any("was left out" in line for line in row.warnings)
