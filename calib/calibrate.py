@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -17,9 +17,9 @@ from toonset.calib.find_cameras import find_cameras
 from toonset.calib.flaws.cropped import at_cuts
 from toonset.calib.flaws.false_holes import fill_false_holes
 from toonset.calib.from_landmarks import calibrate_by_landmarks
-from toonset.calib.hints import Hints, known_of
+from toonset.calib.hints import check_hints, known_of
 from toonset.calib.known import Known
-from toonset.calib.options import CalibrationOptions, Progress
+from toonset.calib.options import CalibrationOptions, Hints, Progress
 from toonset.calib.result import Calibration
 from toonset.calib.verdict.checks import check_names, off_labels
 from toonset.calib.without_body.cues import Cues
@@ -34,6 +34,7 @@ from toonset.dataset.mannequin.options import MannequinOptions
 from toonset.dataset.split_folder.view_labels import parse_labels
 from toonset.errors import MeshError, UsageError
 from toonset.mesh import Mesh
+from toonset.options import Body
 from toonset.view import InputFile, View
 
 LEAST_HEIGHT = 0.01  # of the width; flatter, nothing can be told from its outline
@@ -43,10 +44,9 @@ PACKAGES = ("toonset", "numpy", "scipy", "opencv-contrib-python-headless")
 
 def calibrate(
     views: Sequence[View],
-    mesh: Mesh | Literal["none"] | None = None,
+    body: Mesh | Body = Body.DEFAULT,
     hints: Hints = Hints(),
     *,
-    seed: int = 0,
     progress: Progress = lambda step, share: None,
     cues: Cues | None = None,
     options: CalibrationOptions = CalibrationOptions(),
@@ -58,11 +58,9 @@ def calibrate(
 
     Args:
         views: the drawings, at least one, as `split_sheet` cuts them out.
-        mesh: the posed mannequin; its frame and units become the world's, even where it is refused
-            as another body and cameras come from the drawings. None: no body where drawings are
-            sure of their cameras, else a plain one if it explains them better. "none": no body.
+        body: the posed mannequin; its frame and units become the world's, even where it is refused
+            as another body and cameras come from the drawings. Or what stands in for one.
         hints: what is known of the views.
-        seed: recorded with the result; nothing is random.
         progress: called with the step's name and the share of it that is done.
         cues: what an earlier call has found in the same drawings, and keeps what this one finds;
             those of other drawings are passed over.
@@ -73,14 +71,14 @@ def calibrate(
         ToonsetError: no view, two of one name, a mannequin that lies, a check that does not exist,
             or hints that contradict each other or do not belong to the views or the mannequin.
     """
-    hints.check()
+    check_hints(hints)
     check_names(options.without)
     _check_view_names([view.name for view in views])
     if cues is None or not cues.are_of(views):
         cues = Cues(views)
 
     def as_said(hints: Hints) -> Calibration:
-        return _calibrate(views, mesh, hints, seed, progress, cues, options)
+        return _calibrate(views, body, hints, progress, cues, options)
 
     found, captions = as_said(hints), hints.captions_of(views)
     if not captions:
@@ -94,20 +92,20 @@ def calibrate(
 
 def _calibrate(
     views: Sequence[View],
-    mesh: Mesh | Literal["none"] | None,
+    given: Mesh | Body,
     hints: Hints,
-    seed: int,
     progress: Progress,
     cues: Cues,
     options: CalibrationOptions,
 ) -> Calibration:
     """Return one camera per drawing by the drawings and the hints alone."""
-    if isinstance(mesh, str):
+    if given is Body.NONE:
         known = _known_without_body(hints, views)
         with threadpool_limits(1, user_api="blas"):
             alone = calibrate_without_body(views, known, progress, cues, options)
-            return _alone(views, alone, hints, seed, options)
-    body = _Body.of(mesh)
+            return _alone(views, alone, hints, options)
+    mesh = given if isinstance(given, Mesh) else None
+    body = _Mannequin.of(mesh)
     known = known_of(hints, views, body.points_for(hints))
     with threadpool_limits(1, user_api="blas"):  # more only wait, and change the last digits
         if hints.landmarks_only:
@@ -117,7 +115,7 @@ def _calibrate(
             if mesh is None and tells_directions(views, known):
                 first = calibrate_without_body(views, known, progress, cues, options)
                 if first.is_certain:
-                    return _alone(views, first, hints, seed, options)
+                    return _alone(views, first, hints, options)
             found = find_cameras(views, body.mesh, options, progress, known)
             if mesh is not None and known.is_labels and not found.is_certain:
                 found = _unlabelled_if_better(views, body.mesh, found, known, options, progress)
@@ -132,9 +130,9 @@ def _calibrate(
                 alone=first,
             )
             if has_no_body and mesh is None:
-                return _alone(views, found, hints, seed, options)
+                return _alone(views, found, hints, options)
             if has_no_body:
-                origin = _origin(views, body, hints, seed, options)
+                origin = _origin(views, body, hints, options)
                 refused = in_mannequin_world(found, views, body.mesh)
                 return replace(refused, drawings=tuple(views), origin=origin)
     drawings, found = at_cuts(views, found)
@@ -144,7 +142,7 @@ def _calibrate(
         filled_holes=filled,
         drawings=drawings,
         mesh=body.mesh,
-        origin=_origin(views, body, hints, seed, options),
+        origin=_origin(views, body, hints, options),
     )
 
 
@@ -181,20 +179,20 @@ def _known_without_body(hints: Hints, views: Sequence[View]) -> Known:
 
 
 def _alone(
-    views: Sequence[View], found: Calibration, hints: Hints, seed: int, options: CalibrationOptions
+    views: Sequence[View], found: Calibration, hints: Hints, options: CalibrationOptions
 ) -> Calibration:
     """Return a calibration without a body with its drawings and where it comes from."""
-    return replace(found, drawings=tuple(views), origin=_origin(views, None, hints, seed, options))
+    return replace(found, drawings=tuple(views), origin=_origin(views, None, hints, options))
 
 
 @dataclass(frozen=True, eq=False)
-class _Body:
+class _Mannequin:
     """The mannequin to fit; `given` is the user's, None for the default, made when first used."""
 
     given: Mesh | None
 
     @classmethod
-    def of(cls, mesh: Mesh | None) -> _Body:
+    def of(cls, mesh: Mesh | None) -> _Mannequin:
         if mesh is not None:
             _check_upright(mesh)
         return cls(mesh)
@@ -245,7 +243,7 @@ def _check_view_names(names: Sequence[str]) -> None:
 
 
 def _origin(
-    views: Sequence[View], body: _Body | None, hints: Hints, seed: int, options: CalibrationOptions
+    views: Sequence[View], body: _Mannequin | None, hints: Hints, options: CalibrationOptions
 ) -> dict[str, Any]:
     """Return what calibration.json says of where its cameras come from."""
     origins = list(dict.fromkeys(view.origin for view in views if view.origin is not None))
@@ -260,7 +258,6 @@ def _origin(
     made = {} if body is None or body.looks is None else {"mannequin": asdict(body.looks)}
     return {
         "options": _recorded(options) | hints.as_options(views) | dict(cut) | made | turned,
-        "seed": seed,
         "versions": {name: version(name) for name in PACKAGES},
         "inputs": [  # views may come from files of the same name in several folders
             {"name": file.name, "sha256": file.sha256, "role": file.role} for file in files

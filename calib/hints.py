@@ -1,16 +1,16 @@
-"""Parse what a person says of the views, and resolve it for these drawings."""
+"""Resolve what a person says of the views for these drawings."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from toonset.calib.from_landmarks import landmarks_of_every_view
-from toonset.calib.known import LOCKS, Known
+from toonset.calib.known import Known
+from toonset.calib.options import Hints
 from toonset.calib.outline.pose import Pose
 from toonset.camera import Camera, rotation_from_angles
 from toonset.dataset.bundle.transforms_read import read_cameras
@@ -18,92 +18,24 @@ from toonset.dataset.mannequin.landmark_file import Landmarks, check_inside, rea
 from toonset.dataset.split_folder.corrected import Given
 from toonset.dataset.split_folder.corrections import PlacedCamera, PointPair
 from toonset.dataset.split_folder.view_labels import parse_labels
-from toonset.errors import CameraError, UsageError
-from toonset.options import SYMMETRIC, Symmetric
+from toonset.errors import CameraError
 from toonset.view import View
 
 SQUARE = 1e-3  # a pixel may be this much higher than wide: rounding of a file
 
 
-@dataclass(frozen=True)
-class Hints:
-    """Hints about the views; all are optional.
+def check_hints(hints: Hints) -> None:
+    """Refuse hints that contradict each other, or what the corrections say.
 
-    Attributes:
-        labels: what each view shows, in sheet order: "front,3q,side,back", yaws in degrees, "?"
-            where unknown; empty: what the views themselves say.
-        landmarks: file of pixels that show points of the mannequin, JSON or CSV.
-        landmarks_only: cameras from landmarks alone; the outline is not the mannequin's.
-        init: bundle or transforms.json of these views to start from.
-        lock: what stays as `init` has it (or yaw as labels have it): yaw, elevation, scale, fov.
-        corrections: file of what a person said of single views of a sheet: cameras, locks, labels
-            and landmarks; `split_sheet` takes the same file.
-        symmetric: whether left and right are mirror images, for whoever trains on the bundle:
-            "auto" (unless a drawing shows otherwise), "on" or "off".
+    Raises:
+        UsageError: they do.
+        SheetError: the file of corrections is broken.
     """
-
-    labels: str = ""
-    landmarks: str | Path | None = None
-    landmarks_only: bool = False
-    init: str | Path | None = None
-    lock: tuple[str, ...] = ()
-    corrections: str | Path | None = None
-    symmetric: Symmetric = "auto"
-
-    def check(self) -> None:
-        """Refuse what contradicts itself.
-
-        Raises:
-            UsageError: `symmetric` is not one of the three, `landmarks_only` without landmarks or
-                beside what it does not use, a lock that does not exist, or corrections that say
-                what other hints say.
-            SheetError: the file of corrections is broken.
-        """
-        if self.symmetric not in SYMMETRIC:
-            raise UsageError(
-                f"symmetric: {self.symmetric!r} is unknown; choose one of {', '.join(SYMMETRIC)}"
-            )
-        unknown = [name for name in self.lock if name not in LOCKS]
-        if unknown:
-            raise UsageError(f"--lock: {unknown[0]!r} is none of {', '.join(LOCKS)}")
-        if not self.landmarks_only:
-            if self.corrections is not None:
-                Given.of(self.corrections).check_beside(
-                    views=self.labels, landmarks=self.landmarks, init=self.init
-                )
-            return
-        if self.landmarks is None:
-            raise UsageError("--landmarks-only needs --landmarks FILE")
-        for name, value in {
-            "--views": self.labels,
-            "--init": self.init,
-            "--lock": self.lock,
-            "--corrections": self.corrections,
-        }.items():
-            if value:
-                raise UsageError(f"{name} does nothing beside --landmarks-only; drop one")
-
-    def label_text(self, views: Sequence[View]) -> str:
-        """Return each view's label, its own where the hints have none."""
-        if self.labels or not any(view.label for view in views):
-            return self.labels
-        return ",".join(view.label or "?" for view in views)
-
-    def captions_of(self, views: Sequence[View]) -> str:
-        """Return what the sheet says of the views, "" where a person has said anything."""
-        said = self.label_text(views) or self.landmarks or self.init or self.lock
-        if said or self.corrections or not any(view.caption for view in views):
-            return ""
-        return ",".join(view.caption or "?" for view in views)
-
-    def as_options(self, views: Sequence[View]) -> dict[str, Any]:
-        """Return what calibration.json keeps besides the files."""
-        return {
-            "views": self.label_text(views) or None,
-            "landmarks_only": self.landmarks_only,
-            "locked": list(self.lock),
-            "symmetric": self.symmetric,
-        }
+    hints.check()
+    if hints.corrections is not None:
+        Given.of(hints.corrections).check_beside(
+            views=hints.labels, landmarks=hints.landmarks, init=hints.init
+        )
 
 
 def known_of(hints: Hints, views: Sequence[View], points: Mapping[str, Sequence[float]]) -> Known:

@@ -17,7 +17,6 @@ from toonset.dataset.split_folder.view_labels import Label
 from toonset.errors import CameraError
 from toonset.view import View
 
-LOCKS = ("yaw", "elevation", "scale", "fov")
 PAIR_OF_HEIGHT = 0.015  # error of a landmark under a candidate's camera, proportions included
 
 
@@ -29,7 +28,7 @@ class Known:
         labels: possible yaws of every view; empty for nothing.
         landmarks: pairs of every view, None for a view without; empty for nothing.
         cameras: where to start, in pixels of the views' crops; empty to search.
-        locked: which of `LOCKS` stay as `cameras` (or, for yaw, single labels) have them.
+        locked: which of `Lock` stay as `cameras` (or, for yaw, single labels) have them.
         placed: where a person put the cameras of single views, pixels of their crops, relative to
             the mannequin's middle; None for a view left alone; empty for nothing.
         kept: which views keep yaw and elevation of `placed`, or their label's yaw; empty for none.

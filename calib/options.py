@@ -1,11 +1,115 @@
-"""Define the options and verdict thresholds of calibration. Imports nothing heavy."""
+"""Define hints, options and verdict thresholds of calibration. Imports nothing heavy."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from toonset.dataset.split_folder.options import CORRECTIONS, LABELS
+from toonset.errors import UsageError
+from toonset.options import Option, Symmetric, check_ranges, described
+
+if TYPE_CHECKING:
+    from toonset.view import View
 
 Progress = Callable[[str, float], None]  # step, share done
+
+
+KNOWN_PANEL = "What you know"  # of the help
+Lock = Literal["yaw", "elevation", "scale", "fov"]
+
+
+@described
+@dataclass(frozen=True)
+class Hints:
+    """Hints about the views; all are optional."""
+
+    labels: Annotated[str, replace(LABELS, panel=KNOWN_PANEL)] = ""
+    landmarks: Annotated[
+        str | Path | None,
+        Option(
+            "Which pixels show which points of the mannequin: JSON or CSV.",
+            metavar="FILE",
+            panel=KNOWN_PANEL,
+        ),
+    ] = None
+    landmarks_only: Annotated[
+        bool,
+        Option(
+            "Cameras from --landmarks alone: the outline is not the mannequin's.", panel=KNOWN_PANEL
+        ),
+    ] = False
+    init: Annotated[
+        str | Path | None,
+        Option(
+            "A bundle or transforms.json of these views: start from its cameras.",
+            metavar="PATH",
+            panel=KNOWN_PANEL,
+        ),
+    ] = None
+    lock: Annotated[
+        tuple[Lock, ...],
+        Option(
+            "Keep yaw, elevation, scale or fov as --init has it (or yaw as --views has it); "
+            "repeatable.",
+            metavar="WHAT",
+            panel=KNOWN_PANEL,
+        ),
+    ] = ()
+    corrections: Annotated[str | Path | None, CORRECTIONS] = None
+    symmetric: Annotated[
+        Symmetric,
+        Option(
+            "Left and right are mirror images: on, off, or auto (unless a drawing shows "
+            "otherwise). `toonset train` mirrors what nobody drew.",
+            panel=KNOWN_PANEL,
+        ),
+    ] = "auto"
+
+    def check(self) -> None:
+        """Refuse what contradicts itself, before any file is read.
+
+        Raises:
+            UsageError: `symmetric` or a lock that does not exist, `landmarks_only` without
+                landmarks or beside what it does not use.
+        """
+        check_ranges(self)
+        if not self.landmarks_only:
+            return
+        if self.landmarks is None:
+            raise UsageError("--landmarks-only needs --landmarks FILE")
+        for name, value in {
+            "--views": self.labels,
+            "--init": self.init,
+            "--lock": self.lock,
+            "--corrections": self.corrections,
+        }.items():
+            if value:
+                raise UsageError(f"{name} does nothing beside --landmarks-only; drop one")
+
+    def label_text(self, views: Sequence[View]) -> str:
+        """Return each view's label, its own where the hints have none."""
+        if self.labels or not any(view.label for view in views):
+            return self.labels
+        return ",".join(view.label or "?" for view in views)
+
+    def captions_of(self, views: Sequence[View]) -> str:
+        """Return what the sheet says of the views, "" where a person has said anything."""
+        said = self.label_text(views) or self.landmarks or self.init or self.lock
+        if said or self.corrections or not any(view.caption for view in views):
+            return ""
+        return ",".join(view.caption or "?" for view in views)
+
+    def as_options(self, views: Sequence[View]) -> dict[str, Any]:
+        """Return what calibration.json keeps besides the files."""
+        return {
+            "views": self.label_text(views) or None,
+            "landmarks_only": self.landmarks_only,
+            "locked": list(self.lock),
+            "symmetric": self.symmetric,
+        }
 
 
 @dataclass(frozen=True)

@@ -8,17 +8,18 @@ import threading
 import time
 import webbrowser
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from toonset.cli.common.body import is_no_body
 from toonset.cli.common.output import OUTPUT_PANEL, JsonFlag, Printer, QuietFlag, UpOption
 from toonset.lock import hold
+from toonset.options import Body
 
 if TYPE_CHECKING:
     from toonset.cli.editor.session import Session
 
-NO_BODY = "none"
 LOOK_S = 1.0  # between two looks at whether anybody is there
 ENDS = ("SIGINT", "SIGTERM", "SIGHUP")  # Ctrl-C, the system, the terminal's window
 
@@ -69,7 +70,7 @@ def edit(
 
     printer = Printer(as_json, quiet)
     folder = folder_of(place, out)
-    body: Any = NO_BODY if str(mesh) == NO_BODY else mesh
+    body = Body.NONE if is_no_body(mesh) else mesh
     title = place.stem if place.is_file() else folder.resolve().name
     with Server(title) as server, hold(folder):
         session = open_session(place, folder, body, printer.progress, up)

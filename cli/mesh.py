@@ -43,6 +43,7 @@ def mesh(
     --variants puts more palettes into one GLB, as variants (KHR_materials_variants) that viewers
     and engines switch between: the run's own, "original", first, then one per file.
     """
+    options.check()
     import torch
 
     from toonset.nerf.render.recolor import recolor_run, variants_of

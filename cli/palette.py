@@ -20,6 +20,7 @@ from toonset.cli.common.output import (
     VerboseFlag,
     counted,
 )
+from toonset.dataset.split_folder.options import CORRECTIONS
 from toonset.lock import FOLDERS
 from toonset.palette.options import CHOICE_PANEL, PaletteOptions
 from toonset.write import check_output
@@ -44,10 +45,7 @@ def palette(
     corrections: Annotated[
         Path | None,
         typer.Option(
-            "--corrections",
-            metavar="FILE",
-            help="What a person corrected: the corrections.json of `toonset edit`, or by hand.",
-            rich_help_panel=CHOICE_PANEL,
+            "--corrections", metavar="FILE", help=CORRECTIONS.help, rich_help_panel=CHOICE_PANEL
         ),
     ] = None,
     space: Annotated[

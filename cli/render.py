@@ -47,6 +47,7 @@ def render(
     turns into world units. Several layers are written as NAME-LAYER.png. `--format svg` writes each
     view of `drawn` as smooth paths, too: a group per paint, and lines.
     """
+    options.check()
     printer = Printer(as_json, quiet)
     import torch
 

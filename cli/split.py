@@ -3,23 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from toonset.cli.common.cutting import (
-    CORRECTIONS_PANEL,
-    LABELS_HELP,
-    BackgroundOption,
-    BoxesOption,
-    DropOption,
-    GridOption,
-    GroupOption,
-    MattingOption,
-    OutfitOption,
-)
 from toonset.cli.common.outfits import (
     about,
     check_outfit_output,
@@ -29,6 +19,7 @@ from toonset.cli.common.outfits import (
     print_results,
 )
 from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag
+from toonset.dataset.split_folder.options import SheetOptions
 
 if TYPE_CHECKING:
     from toonset.dataset.split_folder.load import Sheet
@@ -45,19 +36,7 @@ def split(
             metavar="SHEET", help="Character sheets, files of one view each, or folders of them."
         ),
     ],
-    boxes: BoxesOption = None,
-    grid: GridOption = "",
-    background: BackgroundOption = "",
-    drop: DropOption = "",
-    group: GroupOption = None,
-    outfit: OutfitOption = "",
-    matting: MattingOption = None,
-    labels: Annotated[
-        str,
-        typer.Option(
-            "--views", metavar="LABELS", help=LABELS_HELP, rich_help_panel=CORRECTIONS_PANEL
-        ),
-    ] = "",
+    cut: SheetOptions = SheetOptions(),
     out: Annotated[
         Path, typer.Option("-o", "--out", help="Folder.", rich_help_panel=OUTPUT_PANEL)
     ] = Path("views"),
@@ -72,32 +51,20 @@ def split(
     `toonset calibrate`. Exit code 3 when something is doubtful; the files are written then too.
     --outfit all writes a folder for each outfit, A/, B/ and so on.
     """
-    from toonset.dataset.split_folder.cutting import Cutting
     from toonset.dataset.split_folder.load import split_sheet
     from toonset.dataset.split_folder.overlay import draw_sheet
     from toonset.dataset.split_folder.write import split_dict, write_split
     from toonset.errors import PictureError, SheetError
     from toonset.read import check_there
 
-    row = first_row(outfit, drop=drop)
-    Cutting(boxes, grid, background, drop, group, row, matting).check()
+    replace(cut, outfit=first_row(cut.outfit, drop=cut.drop)).check()
     printer = Printer(as_json, quiet)
     check_there(sheets, "picture", PictureError)
-    check_there([boxes], "boxes", SheetError)
-    check_there([matting], "matting network", PictureError)
-    check_outfit_output(out, outfit, [*sheets, boxes, matting], WRITTEN, force=force)
-    cut = partial(
-        split_sheet,
-        sheets,
-        boxes=boxes,
-        grid=grid,
-        background=background,
-        drop=drop,
-        labels=labels,
-        group=group,
-        matting=matting,
-    )
-    found = cut_outfits(sheets, outfit, cut)
+    check_there([cut.boxes], "boxes", SheetError)
+    check_there([cut.matting], "matting network", PictureError)
+    inputs = [*sheets, cut.boxes, cut.matting]
+    check_outfit_output(out, cut.outfit, inputs, WRITTEN, force=force)
+    found = cut_outfits(sheets, cut, partial(split_sheet, sheets))
     with outfit_folders(out, found, force=force) as folder:
         for letter, sheet in found.items():
             overlay = draw_sheet(sheet)

@@ -117,8 +117,8 @@ def test_hints_and_cuts_reach_the_bundle_as_from_the_command(drawn, toonset, tmp
     labels = "front,?,?,288"
     cut = ("--drop", "1", "--background", "#ffffff", "--views", labels, "--mesh", "none")
     assert toonset("calibrate", drawn / "sheet.png", *cut).code in (0, 3)
-    sheet = ts.split_sheet(drawn / "sheet.png", drop="1", background="#ffffff")
-    ts.write_bundle("mine", ts.calibrate(sheet.views, "none", hints=ts.Hints(labels=labels)))
+    sheet = ts.split_sheet(drawn / "sheet.png", ts.SheetOptions(drop="1", background="#ffffff"))
+    ts.write_bundle("mine", ts.calibrate(sheet.views, ts.Body.NONE, hints=ts.Hints(labels=labels)))
     assert_same_files(tmp_path / "bundle", tmp_path / "mine")
     options = json.loads((tmp_path / "mine/calibration.json").read_text())["options"]
     assert (options["drop"], options["views"]) == ("1", labels)
@@ -127,7 +127,7 @@ def test_hints_and_cuts_reach_the_bundle_as_from_the_command(drawn, toonset, tmp
 def test_labels_of_a_split_folder_are_known_without_saying_them_again(drawn, toonset, tmp_path):
     labels = "front,72,144,216,288"
     toonset("split", drawn / "sheet.png", "--views", labels, "-o", tmp_path / "views")
-    found = ts.calibrate(ts.split_sheet(tmp_path / "views").views, mesh="none")
+    found = ts.calibrate(ts.split_sheet(tmp_path / "views").views, ts.Body.NONE)
     assert found.origin["options"]["views"] == labels
 
 
@@ -244,10 +244,16 @@ def test_the_same_bytes_with_blas_on_two_threads(found, drawn, tmp_path):
 
 MISTAKES = [
     (lambda d: ts.split_sheet(d / "none.png"), ("split", "none.png")),
-    (lambda d: ts.split_sheet(d / "sheet.png", grid="x"), ("split", "sheet.png", "--grid", "x")),
-    (lambda d: ts.split_sheet(d / "sheet.png", drop="9"), ("split", "sheet.png", "--drop", "9")),
     (
-        lambda d: ts.split_sheet(d / "sheet.png", labels="front,up"),
+        lambda d: ts.split_sheet(d / "sheet.png", ts.SheetOptions(grid="x")),
+        ("split", "sheet.png", "--grid", "x"),
+    ),
+    (
+        lambda d: ts.split_sheet(d / "sheet.png", ts.SheetOptions(drop="9")),
+        ("split", "sheet.png", "--drop", "9"),
+    ),
+    (
+        lambda d: ts.split_sheet(d / "sheet.png", ts.SheetOptions(labels="front,up")),
         ("split", "sheet.png", "--views", "front,up"),
     ),
     (
@@ -275,7 +281,7 @@ def test_a_mistake_is_one_error_with_the_commands_line(call, command, drawn, too
 
 def test_arguments_that_contradict_each_other(drawn: Path, toonset: Any) -> None:
     with pytest.raises(ts.ToonsetError) as error:
-        ts.split_sheet(drawn / "sheet.png", boxes="b.json", grid="5x1")
+        ts.split_sheet(drawn / "sheet.png", ts.SheetOptions(boxes="b.json", grid="5x1"))
     said = toonset("split", drawn / "sheet.png", "--boxes", "b.json", "--grid", "5x1").reason
     assert str(error.value) in said
     assert "see `toonset split -h`" in said

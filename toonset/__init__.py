@@ -24,16 +24,16 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from toonset.calib.calibrate import calibrate as calibrate
-    from toonset.calib.hints import Hints as Hints
+    from toonset.calib.options import Hints as Hints
     from toonset.calib.result import Calibration as Calibration
     from toonset.calib.write_bundle import write_bundle as write_bundle
     from toonset.camera import Camera as Camera
     from toonset.dataset.bundle.bundle import Bundle as Bundle
     from toonset.dataset.bundle.bundle import read_bundle as read_bundle
-    from toonset.dataset.bundle.scene import Scene as Scene
     from toonset.dataset.images.picture import load_rgba
     from toonset.dataset.mesh.load import load_mesh as load_mesh
     from toonset.dataset.split_folder.load import split_sheet as split_sheet
+    from toonset.dataset.split_folder.options import SheetOptions as SheetOptions
     from toonset.dataset.view_dataset import ViewDataset as ViewDataset
     from toonset.errors import ToonsetError as ToonsetError
     from toonset.mesh import Mesh as Mesh
@@ -44,8 +44,8 @@ if TYPE_CHECKING:
     from toonset.nerf.run.folder import read_field
     from toonset.nerf.score.evaluate import evaluate as evaluate
     from toonset.nerf.surface.surface import surface_of as surface_of
-    from toonset.nerf.training import Run as Run
     from toonset.nerf.training import train as train
+    from toonset.options import Body as Body
     from toonset.palette.extract import extract_palette as extract_palette
     from toonset.palette.extract import label_image as label_image
     from toonset.palette.options import PaletteOptions as PaletteOptions
@@ -57,15 +57,15 @@ if TYPE_CHECKING:
 
 _PLACES = {  # module -> its public names; "name=there" where it is called otherwise there
     "calib.calibrate": "calibrate",
-    "calib.hints": "Hints",
+    "calib.options": "Hints",
     "calib.result": "Calibration",
     "calib.write_bundle": "write_bundle",
     "camera": "Camera",
     "dataset.bundle.bundle": "Bundle read_bundle",
-    "dataset.bundle.scene": "Scene",
     "dataset.images.picture": "load_picture=load_rgba",
     "dataset.mesh.load": "load_mesh",
     "dataset.split_folder.load": "split_sheet",
+    "dataset.split_folder.options": "SheetOptions",
     "dataset.view_dataset": "ViewDataset",
     "errors": "ToonsetError",
     "mesh": "Mesh",
@@ -76,7 +76,8 @@ _PLACES = {  # module -> its public names; "name=there" where it is called other
     "nerf.run.folder": "read_run=read_field",
     "nerf.score.evaluate": "evaluate",
     "nerf.surface.surface": "surface_of",
-    "nerf.training": "Run train",
+    "nerf.training": "train",
+    "options": "Body",
     "palette.extract": "extract_palette label_image",
     "palette.options": "PaletteOptions",
     "palette.palette": "Palette",

@@ -16,6 +16,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Iterator
 from dataclasses import Field, dataclass, fields
+from enum import Enum
 from numbers import Integral, Real
 from types import UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
@@ -25,6 +26,18 @@ from toonset.errors import UsageError
 # Left and right of a character. auto: mirror images unless a drawing shows otherwise
 Symmetric = Literal["auto", "on", "off"]
 SYMMETRIC: tuple[Symmetric, ...] = get_args(Symmetric)
+
+
+class Body(Enum):
+    """What stands in for a mannequin that nobody gives.
+
+    DEFAULT: none where drawings alone are sure of their cameras, else a plain body if it explains
+    them better. NONE: no body, whatever the drawings say.
+    """
+
+    DEFAULT = "default"
+    NONE = "none"
+
 
 AnyClass = TypeVar("AnyClass", bound=type)
 MOST_SEED = MOST_NUMBER = 2**63 - 1  # of an option without a bound of its own

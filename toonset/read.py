@@ -73,7 +73,9 @@ LONE = re.compile("[\ud800-\udfff]")  # pairs are one character once they are re
 BOM = b"\xef\xbb\xbf"
 
 
-def check_there(paths: Iterable[Path | None], thing: str, error_type: type[ToonsetError]) -> None:
+def check_there(
+    paths: Iterable[str | Path | None], thing: str, error_type: type[ToonsetError]
+) -> None:
     """Refuse files that are not there, before any work; what else is wrong their reader says.
 
     Args:
@@ -84,7 +86,7 @@ def check_there(paths: Iterable[Path | None], thing: str, error_type: type[Toons
     Raises:
         ToonsetError: as `error_type`: a file is not there.
     """
-    for path in filter(None, paths):
+    for path in (Path(one) for one in paths if one is not None):
         settle(path)
         try:
             path.stat()

@@ -138,7 +138,7 @@ def new_folder(path: Path, *, force: bool = False) -> Iterator[Path]:
 
 
 def check_output(
-    out: Path, inputs: Iterable[Path | None], written: Sequence[str], *, force: bool
+    out: Path, inputs: Iterable[str | Path | None], written: Sequence[str], *, force: bool
 ) -> None:
     """Refuse, before any work, an output folder that must not be written or replaced.
 
@@ -171,7 +171,7 @@ def check_output(
             f"{out}: holds {foreign[0]!r}, which this command does not write, so --force does not "
             "replace it; choose another -o"
         )
-    kept = [Path(), *(path for path in inputs if path is not None and path.exists())]
+    kept = [Path(), *(Path(one) for one in inputs if one is not None and Path(one).exists())]
     for path in kept:
         if (entries or path == Path()) and path.resolve().is_relative_to(out.resolve()):
             what = "the current folder" if path == Path() else str(path)

@@ -23,6 +23,7 @@ from toonset.camera import Camera
 from toonset.dataset.images.picture import encode_png
 from toonset.errors import ToonsetError
 from toonset.mesh import Mesh
+from toonset.options import Body
 from toonset.view import View
 
 HEIGHT_PX = 220
@@ -67,7 +68,7 @@ def _calibrated(sheet: DrawnSheet) -> Calibration:
     views = [view for view, _ in sheet.drawings]
     if sheet.given == "own":
         return find_cameras(views, sheet.mesh)
-    return calibrate(views, "none" if sheet.given == "none" else None)
+    return calibrate(views, Body.NONE if sheet.given == "none" else Body.DEFAULT)
 
 
 def outlines_picture(

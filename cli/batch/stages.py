@@ -12,7 +12,7 @@ import json
 import pkgutil
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -21,9 +21,13 @@ from typing import Any
 
 import typer
 
+from toonset.cli.common.body import is_no_body
 from toonset.cli.common.flags import arguments_of, each_of, verb_of
 from toonset.cli.common.refusals import refusal
+from toonset.dataset.split_folder.options import SheetOptions
 from toonset.errors import ToonsetError, UsageError, one_line
+from toonset.options import is_described
+from toonset.palette.options import PaletteOptions
 
 PACKAGES = (  # whose versions results depend on
     *("toonset", "numpy", "scipy", "opencv-contrib-python-headless", "torch", "kornia", "Pillow"),
@@ -32,7 +36,6 @@ PACKAGES = (  # whose versions results depend on
 BUNDLE = "bundle"
 RUN = f"{BUNDLE}/run"
 OWN = ("out", "force", "as_json", "quiet", "verbose", "threads", "preview_every", "strict")
-NO_BODY = "none"  # as of `calibrate --mesh`
 FILE_OR_COLORS = ("colors", "keep", "palette", "variants")
 PLACE = Path("place")  # stands for a sheet's own folders while words are checked
 
@@ -197,28 +200,24 @@ def check_options(entries: Iterable[Entry], stages: Sequence[str]) -> None:
             values = parse(stage, words, where)
             try:
                 if words:
-                    _check_values(stage, values)
+                    _check_values(values)
             except ToonsetError as error:
                 raise UsageError(f"{where}: {one_line(error)}") from error
 
 
-def _check_values(stage: str, values: Mapping[str, Any]) -> None:
+def _check_values(values: Mapping[str, Any]) -> None:
     """Refuse what a verb refuses before it reads anything."""
-    from toonset.calib.hints import Hints
     from toonset.cli.common.storage import is_url
-    from toonset.dataset.split_folder.cutting import Cutting
     from toonset.dataset.split_folder.view_labels import parse_labels
     from toonset.palette.extract import rule_of
 
-    if stage == "calibrate":
-        labels, locked = values["labels"], tuple(lock.value for lock in values["locked"] or ())
-        Hints(labels, values["landmarks"], values["landmarks_only"], values["init"], locked).check()
-        Cutting(**{field.name: values[field.name] for field in fields(Cutting)}).check()
-        if labels:
-            parse_labels(labels, labels.count(",") + 1)
-    if stage == "palette":
-        options = values["options"]
-        rule_of(replace(options, keep="") if is_url(options.keep) else options)
+    for options in values.values():
+        if isinstance(options, PaletteOptions):
+            rule_of(replace(options, keep="") if is_url(options.keep) else options)
+        elif is_described(type(options)) and hasattr(options, "check"):
+            options.check()
+        if isinstance(options, SheetOptions) and options.labels:
+            parse_labels(options.labels, options.labels.count(",") + 1)
 
 
 def _typed(context: Any, verb: Stage, words: Sequence[str]) -> str:
@@ -270,7 +269,7 @@ def files_among(values: Mapping[str, Any], words: Sequence[str], root: Path) -> 
     for name, value in each_of(values).items():
         for one in value if isinstance(value, list | tuple) else [value]:
             text, is_path = str(one), isinstance(one, Path) and one != PLACE
-            if is_path and not (name == "mesh" and text == NO_BODY):
+            if is_path and not (name == "mesh" and is_no_body(one)):
                 found[text] = typed.get(text, text)
             elif name in FILE_OR_COLORS and isinstance(one, str) and (root / one).is_file():
                 found[text] = one

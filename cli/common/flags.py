@@ -77,7 +77,7 @@ def arguments_of(context: Any) -> dict[str, Any]:
     """Return what to call the verb of a parsed command line with, by parameter.
 
     Raises:
-        ToonsetError: options out of range, or that contradict each other.
+        ToonsetError: options that are refused when they are made.
     """
     verb, values = verb_of(context.command), context.params
     hints, found = get_type_hints(verb, include_extras=True), {}
@@ -90,15 +90,8 @@ def arguments_of(context: Any) -> dict[str, Any]:
             continue
         flags = [one for one in _flags_in(options) if not is_given or _is_typed(context, one.name)]
         own = {one.name: _value(one, values[one.name], context) for one in flags}
-        found[name] = Given(options, own) if is_given else _checked(options(**own))
+        found[name] = Given(options, own) if is_given else options(**own)
     return found
-
-
-def _checked(options: Any) -> Any:
-    """Return options that do not contradict each other."""
-    if hasattr(options, "check"):
-        options.check()
-    return options
 
 
 def each_of(arguments: Mapping[str, Any]) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from toonset.write import check_output, new_folder
 
 if TYPE_CHECKING:
     from toonset.dataset.split_folder.load import Sheet
+    from toonset.dataset.split_folder.options import SheetOptions
 
 ALL, FIRST = "all", "A"
 FOLDERS = ("[A-Z]",)  # names of what `--outfit all` writes
@@ -50,7 +51,12 @@ def first_row(outfit: str, **of_one_row: object) -> str:
 
 
 def check_outfit_output(
-    out: Path, outfit: str, inputs: Iterable[Path | None], written: Sequence[str], *, force: bool
+    out: Path,
+    outfit: str,
+    inputs: Iterable[str | Path | None],
+    written: Sequence[str],
+    *,
+    force: bool,
 ) -> None:
     """Refuse an output as `check_output` does, with `--outfit all` that of every row, too."""
     inputs = [*inputs]
@@ -64,7 +70,7 @@ def check_outfit_output(
 
 
 def cut_outfits(
-    sheets: Sequence[Path], outfit: str, cut: Callable[..., Sheet]
+    sheets: Sequence[Path], options: SheetOptions, split: Callable[[SheetOptions], Sheet]
 ) -> Mapping[str, Sheet]:
     """Return the drawings of every row that `--outfit` names, by its letter.
 
@@ -73,27 +79,27 @@ def cut_outfits(
 
     Args:
         sheets: as typed.
-        outfit: as typed.
-        cut: `split_sheet` of these sheets; takes `outfit` and `labels`.
+        options: as typed.
+        split: `split_sheet` of these sheets.
 
     Raises:
         UsageError: `--outfit all` with several sheets.
         SheetError: the sheet has no outfits, or one of them cannot be cut.
     """
-    if not is_all(outfit):
-        return {"": cut(outfit=outfit)}
+    if not is_all(options.outfit):
+        return {"": split(options)}
     _check_one_sheet(sheets)
-    first = cut(outfit=FIRST)
+    first = split(replace(options, outfit=FIRST))
     letters = first.outfits
     if not letters:
-        whole = cut(outfit="", labels="")
+        whole = split(replace(options, outfit="", labels=""))
         letters = whole.outfits
         if not letters:
             raise SheetError(_without_outfits(whole))
     found = {FIRST: first}
     for letter in letters[1:]:
         with naming(letter):
-            found[letter] = cut(outfit=letter)
+            found[letter] = split(replace(options, outfit=letter))
     return found
 
 

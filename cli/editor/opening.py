@@ -6,13 +6,12 @@ import os
 from collections.abc import Callable
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from toonset.cli.editor.refit import (
     BY_HAND,
     CORRECTIONS,
     NOTHING,
-    Body,
     Changed,
     DrawnSheet,
     Subject,
@@ -31,9 +30,11 @@ from toonset.dataset.bundle.transforms_read import member, place_in
 from toonset.dataset.mesh.load import load_mesh
 from toonset.dataset.split_folder.corrections import parse_corrections
 from toonset.dataset.split_folder.load import Sheet, split_sheet
+from toonset.dataset.split_folder.options import SheetOptions
 from toonset.errors import BundleError, SheetError, ToonsetError
 from toonset.lock import hold
 from toonset.mesh import Mesh, Up
+from toonset.options import Body
 from toonset.palette.names import hex_of
 from toonset.read import check_there, parse_json, read_whole
 from toonset.view import SHEET
@@ -51,7 +52,7 @@ CUT_BY = (
     "outfit",
 )  # options of `calibrate` that a bundle records
 
-MeshOption = Path | Literal["none"] | None
+MeshOption = Path | Body | None  # None: what the bundle was made with
 
 
 def folder_of(place: Path, out: Path) -> Path:
@@ -85,7 +86,7 @@ def open_session(
 
     if not (folder / CALIBRATION).is_file():
         check_output(folder, [place], WRITTEN, force=False)
-        subject = Subject(place, _given(mesh, up, tell), folder)
+        subject = Subject(place, _given(mesh, up, tell) or Body.DEFAULT, folder)
         drawn, new = make_bundle(subject, NOTHING, ALL, None, progress)
         folder.parent.mkdir(parents=True, exist_ok=True)
         if folder.is_dir():
@@ -142,7 +143,7 @@ def _session(
     return Session(subject, DrawnSheet.of(sheet), corrections, corrections, tell)
 
 
-def _given(mesh: MeshOption, up: Up, tell: Callable[[str], None]) -> Body:
+def _given(mesh: MeshOption, up: Up, tell: Callable[[str], None]) -> Mesh | Body | None:
     """Return the body that is asked for, and tell what was done to it."""
     if not isinstance(mesh, Path):
         return mesh
@@ -152,7 +153,9 @@ def _given(mesh: MeshOption, up: Up, tell: Callable[[str], None]) -> Body:
     return body
 
 
-def _subject(place: Path, folder: Path, found: CalibrationFile, given: Body) -> Subject:
+def _subject(
+    place: Path, folder: Path, found: CalibrationFile, given: Mesh | Body | None
+) -> Subject:
     """Return what a bundle was made of, or is to be made with another body."""
     sheets = [one for one in found.inputs if one.role not in (MESH, BY_HAND, *BESIDE_MESH)]
     if len(sheets) != 1 or sheets[0].role != SHEET:
@@ -169,7 +172,9 @@ def _subject(place: Path, folder: Path, found: CalibrationFile, given: Body) -> 
         return Subject(sheet, given, folder)
     record = next((one for one in found.inputs if one.role == MESH), None)
     if record is None:
-        return Subject(sheet, None if MANNEQUIN_MADE in found.options else "none", folder)
+        return Subject(
+            sheet, Body.DEFAULT if MANNEQUIN_MADE in found.options else Body.NONE, folder
+        )
     file = _found(record, folder, place)
     if file is None:
         raise BundleError(
@@ -201,7 +206,7 @@ def _has_body(found: CalibrationFile, subject: Subject) -> bool:
         same = record is not None and record.sha256 == subject.body.sha256
         return same and subject.body.up == _up(found)
     made = MANNEQUIN_MADE in found.options
-    return record is None and (subject.body is None or not made)
+    return record is None and (subject.body is Body.DEFAULT or not made)
 
 
 def _up(found: CalibrationFile) -> Up:
@@ -234,7 +239,7 @@ def _corrections_file(folder: Path, found: CalibrationFile, place: Path) -> byte
 def _as_it_was_cut(subject: Subject, found: CalibrationFile) -> tuple[Sheet, dict[str, Any]]:
     """Return the drawings of a bundle without corrections, and its options as corrections."""
     options = {name: found.options[name] for name in CUT_BY if found.options.get(name)}
-    sheet = split_sheet(subject.sheet, **options)
+    sheet = split_sheet(subject.sheet, SheetOptions(**options))
     if len(sheet.views) != len(found.views) or found.options.get("boxes"):
         raise BundleError(
             f"{subject.folder}: its sheet was cut by a file of boxes; run `toonset edit "

@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from toonset.calib.calibrate import calibrate
-from toonset.calib.hints import Hints
+from toonset.calib.options import Hints
 from toonset.calib.without_body.cues import Cues
 from toonset.calib.write_bundle import save_bundle
 from toonset.cli.common.label_drawings import label_drawings
@@ -26,6 +26,7 @@ from toonset.dataset.split_folder.pictures import load_pictures
 from toonset.json_file import read_json
 from toonset.lock import FOLDERS, hold, set_of
 from toonset.mesh import Mesh
+from toonset.options import Body
 from toonset.palette.pixels.ink_lines import find_contours
 from toonset.view import SHEET, InputFile, Origin, View
 from toonset.write import exchange_folders, write_bytes, write_json
@@ -35,8 +36,6 @@ NOTHING: dict[str, Any] = {"version": 1}
 BY_HAND = "corrections"  # the file's role among a bundle's inputs
 RUN = "run"  # a trained field: it stays, whatever becomes of the cameras
 CUT, CAMERAS, PALETTE = ("background", "boxes", "group", "outfit"), "views", "palette"
-
-Body = Mesh | Literal["none"] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +49,7 @@ class Subject:
     """
 
     sheet: Path
-    body: Body
+    body: Mesh | Body
     folder: Path
 
     @property

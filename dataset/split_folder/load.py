@@ -27,7 +27,7 @@ from toonset.dataset.split.sheet import PictureOptions, Segmentation, split_pict
 from toonset.dataset.split_folder.boxes import check_boxes, read_boxes
 from toonset.dataset.split_folder.checks import odd_files
 from toonset.dataset.split_folder.corrected import Given
-from toonset.dataset.split_folder.cutting import Cutting
+from toonset.dataset.split_folder.options import SheetOptions
 from toonset.dataset.split_folder.places import IMAGES, SPLIT_FILE, sheet_places
 from toonset.dataset.split_folder.read import read_split
 from toonset.dataset.split_folder.view_labels import parse_labels
@@ -98,61 +98,40 @@ class Sheet:
 
 
 def split_sheet(
-    sheet: Paths,
-    *,
-    boxes: str | Path | None = None,
-    grid: str = "",
-    background: str = "",
-    drop: str = "",
-    labels: str = "",
-    corrections: str | Path | None = None,
-    group: int | None = None,
-    outfit: str = "",
-    matting: str | Path | None = None,
+    sheet: Paths, options: SheetOptions = SheetOptions(), *, corrections: str | Path | None = None
 ) -> Sheet:
     """Return the drawings of a character sheet, cut out with alpha.
 
     Args:
         sheet: a picture, several (one file per view, or several sheets), a folder of them, or a
             folder that `toonset split` wrote.
-        boxes: file with the figures' boxes in sheet pixels: JSON, CSV or a split.json.
-        grid: equal cells, columns x rows, one figure in each: "8x1".
-        background: the paper's colour: "#rrggbb", "white" or "black".
-        drop: leave these out, as numbered without it: "3,5" or "3-5".
-        labels: what each view shows, in sheet order: "front,3q,side,back", yaws in degrees, "?".
+        options: how it is cut, and what the views show. `Sheet.outfits` lists the letters that
+            `outfit` takes, of rows that show the same directions.
         corrections: file of what a person corrected of one of the sheets (docs/formats.md).
-        group: number of the group of equal figures, from 1, as split.json lists them; None: the
-            likeliest turnaround.
-        outfit: letter of a row of the group, "A" is the uppermost; "": all rows. `Sheet.outfits`
-            lists those that show the same directions.
-        matting: ONNX file of a network that takes the figures off their background: U2-Net and
-            others that rembg can use.
 
     Raises:
         ToonsetError: a file is not a picture or shows no figure, is given twice, a split folder is
-            broken, or an argument cannot be understood or does not fit the sheets.
+            broken, or an option cannot be understood or does not fit the sheets.
     """
     paths = [sheet] if isinstance(sheet, str | Path) else sheet
     if not paths:
         raise UsageError("split_sheet: no sheet; give a picture, several, or a folder")
-    files = [None if file is None else Path(file) for file in (boxes, matting)]
-    cutting = Cutting(files[0], grid, background, drop, group, outfit, files[1])
-    cutting.check()
+    options.check()
     given = None if corrections is None else Given.of(corrections)
     if given is not None:
         given.check_beside(
-            boxes=boxes,
-            grid=grid,
-            background=background,
-            drop=drop,
-            views=labels,
-            group=group,
-            outfit=outfit,
+            boxes=options.boxes,
+            grid=options.grid,
+            background=options.background,
+            drop=options.drop,
+            views=options.labels,
+            group=options.group,
+            outfit=options.outfit,
         )
-    return _labelled(_load([Path(path) for path in paths], cutting, given), labels)
+    return _labelled(_load([Path(path) for path in paths], options, given), options.labels)
 
 
-def _load(paths: Sequence[Path], cutting: Cutting, given: Given | None) -> Sheet:
+def _load(paths: Sequence[Path], cutting: SheetOptions, given: Given | None) -> Sheet:
     """Return the views of all sheets, in order and named through."""
     places, skipped = sheet_places(paths)
     cut = _options_per_sheet(places, cutting)
@@ -161,7 +140,7 @@ def _load(paths: Sequence[Path], cutting: Cutting, given: Given | None) -> Sheet
         cut = _as_corrected(places, cut, given)
         where = f"{given.path}: boxes" if given.content.boxes else where
     told = cutting.names_figures or bool(given is not None and given.content.figures_key)
-    network = None if cutting.matting is None else read_network(cutting.matting)
+    network = None if cutting.matting is None else read_network(Path(cutting.matting))
     parts = [
         _of_split_folder(place)
         if options is None
@@ -171,7 +150,7 @@ def _load(paths: Sequence[Path], cutting: Cutting, given: Given | None) -> Sheet
     whole = replace(_joined(parts), skipped=tuple(skipped))
     for role, file in (("boxes", cutting.boxes), ("matting", cutting.matting)):
         if file is not None:
-            whole = replace(whole, files=(*whole.files, InputFile.of(role, file)))
+            whole = replace(whole, files=(*whole.files, InputFile.of(role, Path(file))))
     if given is not None:
         split, notes = given.applied(whole.split)
         files = (*whole.files, InputFile.of("corrections", given.path))
@@ -217,7 +196,9 @@ def _with_origin(sheet: Sheet) -> Sheet:
     return replace(sheet, split=replace(split, views=views))
 
 
-def _options_per_sheet(places: Sequence[Path], cutting: Cutting) -> list[PictureOptions | None]:
+def _options_per_sheet(
+    places: Sequence[Path], cutting: SheetOptions
+) -> list[PictureOptions | None]:
     """Return how every sheet is cut; None for a split folder, which is cut already."""
     is_cut = [place.is_dir() for place in places]
     if cutting.given and any(is_cut):
@@ -231,7 +212,7 @@ def _options_per_sheet(places: Sequence[Path], cutting: Cutting) -> list[Picture
     options = [None if cut else common for cut in is_cut]
     if cutting.boxes is None:
         return options
-    boxes = read_boxes(cutting.boxes)
+    boxes = read_boxes(Path(cutting.boxes))
     if len(boxes) != len(places):
         raise SheetError(
             f"--boxes: {cutting.boxes} has boxes of {len(boxes)} sheet(s), {len(places)} are "
@@ -259,7 +240,7 @@ def _as_corrected(
     if said.background:
         cut = replace(cut, background_rgb=rgb_of_hex(said.background, "background"))
     if said.figures_key:
-        taken = Cutting(group=said.group, outfit=said.outfit).taken
+        taken = SheetOptions(group=said.group, outfit=said.outfit).taken
         cut = replace(cut, boxes=said.boxes, taken=taken)
     found[number] = cut
     return found

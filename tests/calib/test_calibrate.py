@@ -13,9 +13,8 @@ from bench.calib.figures import view_error
 from bench.cases.bodies import random_body
 from toonset.calib.calibrate import calibrate
 from toonset.calib.find_cameras import find_cameras
-from toonset.calib.hints import Hints
 from toonset.calib.known import Known
-from toonset.calib.options import CalibrationOptions, VerdictThresholds
+from toonset.calib.options import CalibrationOptions, Hints, VerdictThresholds
 from toonset.calib.outline.correspondences import Drawing, match
 from toonset.calib.outline.occluding_contour import prepare_surface
 from toonset.calib.outline.pose import Pose

@@ -8,8 +8,7 @@ import pytest
 from bench.cases.bodies import random_body
 from toonset.calib.calibrate import calibrate
 from toonset.calib.captions import weigh_captions
-from toonset.calib.hints import Hints
-from toonset.calib.options import VerdictThresholds
+from toonset.calib.options import Hints, VerdictThresholds
 from toonset.dataset.split.sheet import split_picture
 from toonset.dataset.split_folder.view_labels import parse_labels
 from toonset.dataset.synthetic.options import SynthOptions

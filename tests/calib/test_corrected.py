@@ -3,14 +3,14 @@
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pytest
 
 from bench.cases.bodies import random_body
 from toonset.calib.calibrate import calibrate
-from toonset.calib.hints import Hints
+from toonset.calib.options import Hints
 from toonset.calib.result import Calibration
 from toonset.camera import Camera, rotation_distance
 from toonset.dataset.images.picture import encode_png
@@ -19,6 +19,7 @@ from toonset.dataset.synthetic.options import SynthOptions
 from toonset.dataset.synthetic.turnaround import Turnaround, make_turnaround
 from toonset.errors import LandmarkError, UsageError
 from toonset.mesh import Mesh
+from toonset.options import Body
 
 OPTIONS = SynthOptions(views=4, cell_px=160, outline_px=0, elevation_deg=8)
 WRONG_DEG = 12.0  # far enough to be seen, near enough to be dragged
@@ -35,7 +36,7 @@ class Drawn:
         self.plain = split_sheet(self.path)
 
     def found(
-        self, *views: dict[str, Any], mesh: Mesh | Literal["none"] | None = None, **other: Any
+        self, *views: dict[str, Any], mesh: Mesh | Body | None = None, **other: Any
     ) -> Calibration:
         """Return the calibration with what is said of views."""
         path = self.path.with_name("corrections.json")
@@ -141,7 +142,7 @@ def test_what_contradicts_is_refused(drawn: Drawn):
         drawn.found(clicked)
     clicked["landmarks"] = landmarks(drawn, 0, 4)
     with pytest.raises(UsageError, match="landmarks need a mannequin; drop them or --mesh none"):
-        drawn.found(clicked, mesh="none")
+        drawn.found(clicked, mesh=Body.NONE)
     path = drawn.path.with_name("corrections.json")
     with pytest.raises(UsageError, match="--corrections does nothing beside --landmarks-only"):
         Hints(landmarks=path, landmarks_only=True, corrections=path).check()
@@ -149,6 +150,6 @@ def test_what_contradicts_is_refused(drawn: Drawn):
 
 def test_without_a_body_a_lock_keeps_its_yaw(drawn: Drawn):
     entry = {"box": drawn.plain.views[1].figure_box, "label": "100", "lock": True}
-    found = drawn.found(entry, mesh="none")
+    found = drawn.found(entry, mesh=Body.NONE)
     assert np.degrees(found.views[1].camera.angles[0]) == pytest.approx(100, abs=0.01)
     assert replace(found, drawings=()).mesh is None

@@ -84,7 +84,7 @@ def test_help_is_also_a_word(asked, shown, toonset):
         ),
         (["calibrate", "a.png", "--lock", "roll"], ["--lock", "'elevation', 'scale', 'fov'"]),
         (["calibrate", "a.png", "--mesh", "m.obj", "--forse"], ["--forse", "--force"]),
-        (["calibrate", "a.png", "--mesh", "m.obj", "--seed", "x"], ["--seed", "integer"]),
+        (["calibrate", "a.png", "--mesh", "m.obj", "--front", "x"], ["--front", "integer"]),
         (["train", "--steps", "0"], ["--steps", "1"]),
         (["train", "--steps", "9" * 30], ["--steps", "10000000"]),
         (["render", "--threads", "9" * 30], ["--threads", "1024"]),

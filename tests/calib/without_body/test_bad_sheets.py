@@ -11,7 +11,7 @@ from PIL import Image
 from bench.cases.bodies import random_body
 from toonset.calib.calibrate import calibrate
 from toonset.calib.find_cameras import find_cameras
-from toonset.calib.hints import Hints
+from toonset.calib.options import Hints
 from toonset.calib.result import Calibration
 from toonset.calib.verdict.one_character import other_character
 from toonset.calib.verdict.repeated import repeated_drawings
@@ -21,6 +21,7 @@ from toonset.dataset.split_folder.view_labels import front_label
 from toonset.dataset.synthetic.options import SynthOptions
 from toonset.dataset.synthetic.turnaround import Turnaround, make_turnaround
 from toonset.errors import UsageError
+from toonset.options import Body
 from toonset.view import View
 
 VIEWS = 4
@@ -63,7 +64,7 @@ def as_jpeg(view: View) -> View:
 
 def alone(views: Sequence[View], labels: str = front_label(0, VIEWS)) -> Calibration:
     named = [replace(view, name=f"{i:03d}.png") for i, view in enumerate(views)]
-    return calibrate(named, "none", Hints(labels=labels))
+    return calibrate(named, Body.NONE, Hints(labels=labels))
 
 
 def off_ring(found: Calibration, ring: np.ndarray = RING) -> float:
@@ -202,6 +203,6 @@ def test_with_a_mannequin_two_drawings_are_enough(made, views, chosen):
 
 def test_landmarks_without_their_mannequin_are_a_mistake(views: list[View]) -> None:
     with pytest.raises(UsageError, match="--lock elevation needs a mannequin"):
-        calibrate(views, "none", Hints(lock=("elevation",)))
+        calibrate(views, Body.NONE, Hints(lock=("elevation",)))
     with pytest.raises(UsageError, match="--landmarks needs a mannequin; drop it or --mesh none"):
-        calibrate(views, "none", Hints(landmarks="points.json"))
+        calibrate(views, Body.NONE, Hints(landmarks="points.json"))

@@ -11,9 +11,8 @@ import pytest
 import trimesh
 
 from toonset.calib.calibrate import calibrate
-from toonset.calib.hints import Hints
 from toonset.calib.known import Known
-from toonset.calib.options import VerdictThresholds
+from toonset.calib.options import Hints, VerdictThresholds
 from toonset.calib.without_body import rival
 from toonset.calib.without_body.find import calibrate_without_body
 from toonset.calib.without_body.placing import Figures, place
@@ -25,6 +24,7 @@ from toonset.camera import Camera
 from toonset.dataset.split_folder.view_labels import front_label, parse_labels
 from toonset.errors import SheetError
 from toonset.mesh import Mesh
+from toonset.options import Body
 from toonset.view import View
 
 SIDE = 120
@@ -176,7 +176,7 @@ def test_drawings_that_are_no_turn_are_never_ok() -> None:
 
 def test_a_bundle_without_a_body_has_no_mannequin(tmp_path: Path) -> None:
     ring = RING[::2]
-    found = calibrate(sheet(ring), "none", Hints(labels="front,?,?,?"))
+    found = calibrate(sheet(ring), Body.NONE, Hints(labels="front,?,?,?"))
     assert found.views[0].p_flip < 1 - VerdictThresholds().sure
     bundle = write_bundle(tmp_path / "bundle", found)
     assert bundle.mannequin is None
@@ -265,7 +265,7 @@ def test_eye_level_and_orthography_unless_drawings_prove_more() -> None:
 def test_labels_lock_yaws_without_a_mannequin() -> None:
     yaws = np.radians([0, 50, 90, 180])
     hints = Hints(labels="0,50,90,180", lock=("yaw",))
-    found = calibrate(sheet(yaws, 0.0), "none", hints)
+    found = calibrate(sheet(yaws, 0.0), Body.NONE, hints)
     np.testing.assert_allclose(off_from(yaws, found.views), 0, atol=1e-9)
 
 

@@ -153,13 +153,13 @@ def test_manifest_says_more_of_a_sheet(library: Path) -> None:
         manifest(
             library,
             "sheet,name,mesh,views,calibrate_options,train_options,character,license,source\n"
-            'ann.png;bob.png,one,body.obj,"front,back",--seed 3,--steps 40,Ann,CC0-1.0,here\n',
+            'ann.png;bob.png,one,body.obj,"front,back",--group 3,--steps 40,Ann,CC0-1.0,here\n',
         ),
         {"calibrate": ("--grid", "2x1")},
     )
     assert entry.sheets == (str(library / "ann.png"), str(library / "bob.png"))
     mesh = f"--mesh={library / 'body.obj'}"
-    assert entry.words["calibrate"] == ("--grid", "2x1", "--seed", "3", mesh, "--views=front,back")
+    assert entry.words["calibrate"] == ("--grid", "2x1", "--group", "3", mesh, "--views=front,back")
     assert entry.words["train"] == ("--steps", "40")
     assert (entry.character, entry.license, entry.source) == ("Ann", "CC0-1.0", "here")
 

@@ -11,6 +11,7 @@ from tests.cli.split_sheets import drawn_sheet
 from toonset.dataset.images.picture import encode_png
 from toonset.dataset.split.sheet import split_picture
 from toonset.dataset.split_folder.load import split_sheet
+from toonset.dataset.split_folder.options import SheetOptions
 from toonset.errors import SheetError, UsageError
 
 LABELS = "front,side,back"
@@ -95,12 +96,14 @@ def test_a_sheet_names_its_outfits(sheet: Path, drawings):
     assert split_sheet("turning.png").outfits == ()
     assert split_sheet([sheet, "turning.png"]).outfits == ()
     with pytest.raises(SheetError, match="--outfit: 'all' is no row; write a letter"):
-        split_sheet(sheet, outfit="all")
+        split_sheet(sheet, SheetOptions(outfit="all"))
 
 
 def test_outfits_whose_figures_touch_are_found(sheet: Path, drawings, toonset):
     sheet.write_bytes(drawings["touching"])
-    assert split_sheet(sheet, outfit="A").outfits == ()  # those of row B are not cut apart
+    assert (
+        split_sheet(sheet, SheetOptions(outfit="A")).outfits == ()
+    )  # those of row B are not cut apart
     done = toonset("split", sheet, "--outfit", "all", "-q", "--json")
     assert [len(one["views"]) for one in done.json["outfits"].values()] == [3, 3]
 

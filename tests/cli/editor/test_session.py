@@ -27,6 +27,7 @@ from toonset.dataset.bundle.calibration_schema import CalibrationFile
 from toonset.dataset.bundle.check import bundle_problems
 from toonset.dataset.images.picture import encode_png
 from toonset.dataset.split_folder.load import split_sheet
+from toonset.dataset.split_folder.options import SheetOptions
 from toonset.errors import BundleError, SheetError, ToonsetError
 
 Command = Any
@@ -250,7 +251,7 @@ def test_a_bundle_of_another_outfit_is_opened_as_it_was_cut(tmp_path: Path) -> N
     sheet = tmp_path / "outfits.png"
     sheet.write_bytes(encode_png(make_messy_sheet(4102, ("outfits",)).rgba))
     options = {"outfit": "B"}
-    views = split_sheet(sheet, outfit="B").views
+    views = split_sheet(sheet, SheetOptions(outfit="B")).views
     found = cast(CalibrationFile, SimpleNamespace(options=options, views=views))
     _, corrections = opening._as_it_was_cut(Subject(sheet, None, tmp_path), found)
     assert corrections == {"version": 1, "outfit": "B"}

@@ -11,6 +11,7 @@ from tests.conftest import Command
 from toonset.dataset.images.matting_network import read_network, without_background
 from toonset.dataset.images.picture import encode_png
 from toonset.dataset.split_folder.load import split_sheet
+from toonset.dataset.split_folder.options import SheetOptions
 from toonset.errors import PictureError
 
 SIDE = 64
@@ -81,7 +82,7 @@ def test_figures_come_off_a_backdrop(scene: np.ndarray, tmp_path: Path) -> None:
 def test_a_sheet_is_split_with_it(scene: np.ndarray, tmp_path: Path, toonset: Command) -> None:
     sheet, file = tmp_path / "sheet.png", network(tmp_path / "dark.onnx")
     sheet.write_bytes(encode_png(scene))
-    found = split_sheet(sheet, matting=file)
+    found = split_sheet(sheet, SheetOptions(matting=file))
     left = [view.figure_box[0] for view in found.views]
     assert np.abs(np.subtract(left, [105, 375])).max() <= 10  # the tiny network sees 64 px
     assert found.options == {"matting": "dark.onnx"}

@@ -12,6 +12,7 @@ from toonset.dataset.split import captions
 from toonset.dataset.split.captions import Text, caption_labels, label_of, with_captions
 from toonset.dataset.split.sheet import PictureOptions, split_picture
 from toonset.dataset.split_folder.load import split_sheet
+from toonset.dataset.split_folder.options import SheetOptions
 from toonset.dataset.split_folder.overlay import draw_sheet
 from toonset.dataset.split_folder.read import read_split
 from toonset.dataset.split_folder.view_labels import NAMES
@@ -184,7 +185,7 @@ def test_a_split_folder_keeps_captions_and_labels_replace_them(reader, tmp_path)
         ("", "side"),
         ("", "back"),
     ]
-    typed = split_sheet(file, labels="back,?,front")
+    typed = split_sheet(file, SheetOptions(labels="back,?,front"))
     assert [(view.label, view.caption) for view in typed.views] == [
         ("back", ""),
         ("", ""),
@@ -212,7 +213,7 @@ def test_the_group_with_captions_is_taken(reader, tmp_path):
 
 
 def test_what_a_person_takes_stays(reader, tmp_path):
-    sheet = split_sheet(two_rows(tmp_path), group=1)
+    sheet = split_sheet(two_rows(tmp_path), SheetOptions(group=1))
     assert [view.figure_box[3] for view in sheet.views] == [137] * 3
 
 

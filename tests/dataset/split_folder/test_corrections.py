@@ -19,6 +19,7 @@ from toonset.dataset.split_folder.corrections import (
     read_corrections,
 )
 from toonset.dataset.split_folder.load import split_sheet
+from toonset.dataset.split_folder.options import SheetOptions
 from toonset.errors import SheetError, ToonsetError, UsageError
 from toonset.read import MAX_DEPTH
 
@@ -228,7 +229,7 @@ def test_boxes_by_hand_may_be_generous(sheet: Path, tmp_path):
 )
 def test_what_the_sheet_or_an_option_speaks_against(content, options, words, sheet, tmp_path):
     with pytest.raises((SheetError, UsageError)) as refused:
-        split_sheet(sheet, corrections=written(tmp_path, **content), **options)
+        split_sheet(sheet, SheetOptions(**options), corrections=written(tmp_path, **content))
     assert "corrections.json: " in str(refused.value)
     assert words in str(refused.value)
 
@@ -236,7 +237,7 @@ def test_what_the_sheet_or_an_option_speaks_against(content, options, words, she
 def test_a_group_and_an_outfit_are_taken_as_the_options_take_them(tmp_path: Path) -> None:
     sheet = tmp_path / "poses.png"
     Image.fromarray(make_messy_sheet(4100, ("poses",)).rgba).save(sheet)
-    poses = split_sheet(sheet, group=2).views
+    poses = split_sheet(sheet, SheetOptions(group=2)).views
     found = split_sheet(sheet, corrections=written(tmp_path, group=2)).views
     assert [view.box for view in found] == [view.box for view in poses]
     with pytest.raises(SheetError, match="there is no such group: the sheet has 2"):
@@ -247,7 +248,7 @@ def test_boxes_of_an_option_stay_beside_a_background_by_hand(sheet: Path, tmp_pa
     boxes = tmp_path / "boxes.csv"
     boxes.write_text("0,0,115,200\n")
     path = written(tmp_path, background="#ffffff")
-    assert len(split_sheet(sheet, boxes=boxes, corrections=path).views) == 1
+    assert len(split_sheet(sheet, SheetOptions(boxes=boxes), corrections=path).views) == 1
 
 
 def test_not_all_views_may_be_excluded(sheet: Path, tmp_path):

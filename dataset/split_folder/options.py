@@ -1,40 +1,94 @@
-"""Define the options of how sheets are cut, as a person types them."""
+"""Define the options of a sheet: how it is cut, as a person types it. Imports nothing heavy."""
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from toonset.dataset.split.figures.rows import Taken
 from toonset.errors import PaletteError, SheetError, UsageError
-from toonset.palette.formats.hex import rgb_of_typed
+from toonset.options import Option, described
 
+if TYPE_CHECKING:
+    from toonset.dataset.split.figures.rows import Taken
+
+FIGURES_PANEL = "Where the figures are"  # of the help
+LABELS = Option(
+    "What each view shows, in sheet order: front,3q,side,back ..., yaws in degrees, ? if unknown.",
+    flag="--views",
+    metavar="LABELS",
+    panel=FIGURES_PANEL,
+)
+CORRECTIONS = Option(
+    "What a person corrected: the corrections.json of `toonset edit`, or by hand.",
+    metavar="FILE",
+    panel=FIGURES_PANEL,
+)
 MOST_CELLS = 1000  # a sheet of letters or a tile map is not a character sheet
 
 
+@described
 @dataclass(frozen=True)
-class Cutting:
-    """Options of how sheets are cut.
+class SheetOptions:
+    """How sheets are cut into views, and what the views show."""
 
-    Attributes:
-        boxes: file of boxes.
-        grid: columns and rows of equal cells, "8x1".
-        background: colour of the paper.
-        drop: numbers of views to leave out, "3,5" or "3-5".
-        group: number of the group of figures, from 1; None: the likeliest turnaround.
-        outfit: letter of a row of the group, "A" is the uppermost; "": all rows.
-        matting: ONNX file of a network that takes the figures off their background.
-    """
-
-    boxes: Path | None = None
-    grid: str = ""
-    background: str = ""
-    drop: str = ""
-    group: int | None = None
-    outfit: str = ""
-    matting: Path | None = None
+    boxes: Annotated[
+        str | Path | None,
+        Option(
+            "Boxes of the figures in sheet pixels: JSON, CSV x,y,width,height, or a split.json.",
+            metavar="FILE",
+            panel=FIGURES_PANEL,
+        ),
+    ] = None
+    grid: Annotated[
+        str,
+        Option(
+            "Equal cells, columns x rows, one figure in each: 8x1. 8x is a strip of 8.",
+            metavar="CxR",
+            panel=FIGURES_PANEL,
+        ),
+    ] = ""
+    background: Annotated[
+        str,
+        Option(
+            "The paper's colour: '#rrggbb', white or black.", metavar="COLOUR", panel=FIGURES_PANEL
+        ),
+    ] = ""
+    drop: Annotated[
+        str,
+        Option(
+            "Leave these out, as numbered in overlay.png without --drop: 3,5 or 3-5.",
+            metavar="NUMBERS",
+            panel=FIGURES_PANEL,
+        ),
+    ] = ""
+    group: Annotated[
+        int | None,
+        Option(
+            "Another group of equal figures, as listed: 2 is the second likeliest turnaround.",
+            metavar="N",
+            panel=FIGURES_PANEL,
+        ),
+    ] = None
+    outfit: Annotated[
+        str,
+        Option(
+            "One row of the group, where rows show other clothes: A is the uppermost; all: a "
+            "folder for each row.",
+            metavar="LETTER",
+            panel=FIGURES_PANEL,
+        ),
+    ] = ""
+    matting: Annotated[
+        str | Path | None,
+        Option(
+            "A network that takes figures off backdrops: u2net.onnx or another one of rembg's.",
+            metavar="FILE",
+            panel=FIGURES_PANEL,
+        ),
+    ] = None
+    labels: Annotated[str, LABELS] = ""
 
     def check(self) -> None:
         """Refuse what contradicts itself or cannot be understood, before any file is read.
@@ -62,6 +116,8 @@ class Cutting:
     @property
     def background_rgb(self) -> tuple[int, int, int] | None:
         """Return the colour of the paper; None to find it."""
+        from toonset.palette.formats.hex import rgb_of_typed
+
         word = self.background.strip().lower()
         if not word:
             return None
@@ -90,6 +146,8 @@ class Cutting:
     @property
     def taken(self) -> Taken:
         """Return which group of figures is wanted."""
+        from toonset.dataset.split.figures.rows import Taken
+
         if self.group is not None and self.group < 1:
             raise SheetError(f"--group: {self.group} is no group; the first one is 1")
         letter = self.outfit.strip().upper()
@@ -121,13 +179,13 @@ class Cutting:
     def as_options(self) -> dict[str, Any]:
         """Return what is kept of it beside the results; only what was given."""
         named = {
-            "boxes": self.boxes.name if self.boxes else "",
+            "boxes": Path(self.boxes).name if self.boxes else "",
             "drop": self.drop,
             "background": self.background,
             "grid": self.grid,
             "group": self.group or "",
             "outfit": self.outfit.strip().upper(),
-            "matting": self.matting.name if self.matting else "",
+            "matting": Path(self.matting).name if self.matting else "",
         }
         return {name: value for name, value in named.items() if value}
 
