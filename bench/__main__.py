@@ -21,14 +21,7 @@ from bench.commands.results import REPORT, result_files
 from bench.commands.results import WRITTEN as RESULTS
 from toonset.cli.common.flags import command_of
 from toonset.cli.common.help import Verb
-from toonset.cli.common.output import (
-    OUTPUT_PANEL,
-    ForceFlag,
-    JsonFlag,
-    Printer,
-    QuietFlag,
-    SeedOption,
-)
+from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, Printer, SeedOption
 from toonset.cli.main import run
 from toonset.write import check_output
 
@@ -84,8 +77,8 @@ def bench(
     ] = Path("bench-results"),
     force: ForceFlag = False,
     seed: SeedOption = 0,
-    as_json: JsonFlag = False,
-    quiet: QuietFlag = False,
+    *,
+    printer: Printer,
 ) -> None:
     """Measure one stage: seconds against accuracy, per setting, beside a baseline.
 
@@ -100,7 +93,6 @@ def bench(
     from bench.records.record import as_dicts, machine
     from toonset.write import new_folder, write_bytes
 
-    printer = Printer(as_json, quiet)
     if against_committed or renew:
         others = (subject, cases, sprites, only, count, half, quick, force)
         if any(others) or (against_committed and renew):

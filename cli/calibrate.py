@@ -23,12 +23,10 @@ from toonset.cli.common.outfits import (
 )
 from toonset.cli.common.output import (
     OUTPUT_PANEL,
+    DetailPrinter,
     ForceFlag,
-    JsonFlag,
     Printer,
-    QuietFlag,
     UpOption,
-    VerboseFlag,
     counted,
 )
 from toonset.dataset.split_folder.options import SheetOptions
@@ -78,9 +76,8 @@ def calibrate(
         Path, typer.Option("-o", "--out", help="Bundle folder.", rich_help_panel=OUTPUT_PANEL)
     ] = Path("bundle"),
     force: ForceFlag = False,
-    as_json: JsonFlag = False,
-    quiet: QuietFlag = False,
-    verbose: VerboseFlag = False,
+    *,
+    printer: DetailPrinter,
 ) -> None:
     """Fit one camera per drawing by aligning its outline with a posed mannequin.
 
@@ -102,7 +99,6 @@ def calibrate(
     of_one_row = {"corrections": hints.corrections, "landmarks": hints.landmarks}
     row = first_row(cut.outfit, drop=cut.drop, **of_one_row, init=hints.init)
     replace(cut, outfit=row).check()
-    printer = Printer(as_json, quiet, verbose)
     _check_files(sheets, hints, cut, front=front is not None)
     body = body_of(mesh, up)
     given = None if is_no_body(mesh) else mesh

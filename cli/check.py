@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from toonset.cli.common.output import JsonFlag, Printer, QuietFlag, counted
+from toonset.cli.common.output import Printer, counted
 from toonset.errors import BundleError
 
 if TYPE_CHECKING:
@@ -27,8 +27,8 @@ def info(
             metavar="FOLDER", help="A bundle, a run, a split folder, or any transforms.json."
         ),
     ] = Path("bundle"),
-    as_json: JsonFlag = False,
-    quiet: QuietFlag = False,
+    *,
+    printer: Printer,
 ) -> None:
     """Tell what is in a bundle: views and how sure they are, colours, runs, sizes, versions.
 
@@ -37,7 +37,6 @@ def info(
     """
     from toonset.cli.common.info_text import bundle_text, run_text, split_text
 
-    printer = Printer(as_json, quiet)
     kind = kind_of(bundle)
     if kind == RUN:
         found = summarise_run(bundle)
@@ -70,8 +69,8 @@ def check(
             metavar="FOLDER", help="A bundle, a run, a split folder, or any transforms.json."
         ),
     ] = Path("bundle"),
-    as_json: JsonFlag = False,
-    quiet: QuietFlag = False,
+    *,
+    printer: Printer,
 ) -> None:
     """Say everything that is wrong with a bundle: which file, what, and what to do.
 
@@ -82,10 +81,10 @@ def check(
     width = max((len(problem.where) for problem in problems), default=0)
     lines = [f"{problem.where:{width}}  {problem.what}" for problem in problems]
     count = counted(len(problems), "problem") if problems else "no problem"
-    if not quiet:
+    if not printer.quiet:
         lines.append(f"{bundle}: {count}")
     found = [{"where": problem.where, "what": problem.what} for problem in problems]
-    Printer(as_json, quiet).result({"path": bundle, "problems": found}, "\n".join(lines))
+    printer.result({"path": bundle, "problems": found}, "\n".join(lines))
     if problems:
         raise typer.Exit(BAD)
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from toonset.cli.common.body import is_no_body
-from toonset.cli.common.output import OUTPUT_PANEL, JsonFlag, Printer, QuietFlag, UpOption
+from toonset.cli.common.output import OUTPUT_PANEL, Printer, UpOption
 from toonset.lock import hold
 from toonset.options import Body
 
@@ -55,8 +55,8 @@ def edit(
             "--idle", metavar="MINUTES", min=0.01, help="Stop after so long without a correction."
         ),
     ] = 60.0,
-    as_json: JsonFlag = False,
-    quiet: QuietFlag = False,
+    *,
+    printer: Printer,
 ) -> None:
     """Correct a sheet's figures, cameras and palette on a page in the browser.
 
@@ -68,7 +68,6 @@ def edit(
     from toonset.cli.editor.opening import folder_of, open_session
     from toonset.cli.editor.server import Server
 
-    printer = Printer(as_json, quiet)
     folder = folder_of(place, out)
     body = Body.NONE if is_no_body(mesh) else mesh
     title = place.stem if place.is_file() else folder.resolve().name

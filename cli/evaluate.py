@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag
+from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, Printer
 from toonset.errors import UsageError
 from toonset.write import check_output
 
@@ -66,8 +66,8 @@ def evaluate(
         ),
     ] = None,
     force: ForceFlag = False,
-    as_json: JsonFlag = False,
-    quiet: QuietFlag = False,
+    *,
+    printer: Printer,
 ) -> None:
     """Compare renderings with held-out pictures, and apart from them with the training drawings.
 
@@ -88,7 +88,6 @@ def evaluate(
     from toonset.nerf.score.evaluate import report, score_views
     from toonset.nerf.score.metrics_view import load_judges
 
-    printer = Printer(as_json, quiet)
     if leave_one_out == (test is not None):
         raise UsageError("give --test with held-out views, or --leave-one-out")
     if test is None:
@@ -221,8 +220,8 @@ def consistency(
         typer.Option("--out", "-o", help="Folder to write into; default: BUNDLE/consistency."),
     ] = None,
     force: ForceFlag = False,
-    as_json: JsonFlag = False,
-    quiet: QuietFlag = False,
+    *,
+    printer: Printer,
 ) -> None:
     """Say per drawing how far it is shifted, sized and bent against the others, and show where.
 
@@ -234,7 +233,6 @@ def consistency(
     from toonset.nerf.prepare.consistency import consistency_of, consistency_picture
     from toonset.write import check_output, new_folder, write_bytes, write_json
 
-    printer = Printer(as_json, quiet)
     folder = out or (bundle if bundle.is_dir() else bundle.parent) / "consistency"
     scene = read_scene(bundle)
     check_output(folder, [bundle], CONSISTENCY_WRITTEN, force=force)

@@ -13,9 +13,7 @@ from toonset.cli.common.export_formats import TARGETS, Format, Job
 from toonset.cli.common.output import (
     OUTPUT_PANEL,
     ForceFlag,
-    JsonFlag,
     Printer,
-    QuietFlag,
     SeedOption,
     UpOption,
     counted,
@@ -91,8 +89,8 @@ def export(
     ] = None,
     force: ForceFlag = False,
     seed: SeedOption = 0,
-    as_json: JsonFlag = False,
-    quiet: QuietFlag = False,
+    *,
+    printer: Printer,
 ) -> None:
     """Write a bundle for another program: pictures, cameras, mannequin, and toonset.json.
 
@@ -108,7 +106,6 @@ def export(
         raise typer.BadParameter("--pinholes belongs to --to nerfstudio")
     if to != Format.blender and body not in (None, NO_BODY):
         raise typer.BadParameter("--body belongs to --to blender")
-    printer = Printer(as_json, quiet)
     if to == Format.blender_addon:
         if bundle is not None or mesh is not None:
             raise typer.BadParameter("the add-on is of no bundle: leave out BUNDLE and --mesh")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag, counted
+from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, Printer, counted
 from toonset.write import check_output
 
 if TYPE_CHECKING:
@@ -45,8 +45,8 @@ def import_(
         typer.Option("--up", help="z: turn a world of Blender's (+Z up, front -Y) to ours."),
     ] = "y",
     force: ForceFlag = False,
-    as_json: JsonFlag = False,
-    quiet: QuietFlag = False,
+    *,
+    printer: Printer,
 ) -> None:
     """Make a bundle of another program's cameras and pictures.
 
@@ -57,7 +57,6 @@ def import_(
     from toonset.dataset.importers.detect import read_import
     from toonset.dataset.importers.to_bundle import write_imported
 
-    printer = Printer(as_json, quiet)
     imported = read_import(path, images, masks)
     body = mannequin_of(path.parent if path.is_file() else path, mesh)
     check_output(out, [path, images, masks, mesh], WRITTEN, force=force)

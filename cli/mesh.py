@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag
+from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, Printer
 from toonset.nerf.options import ORIGINAL, MeshOptions
 
 
@@ -27,8 +27,8 @@ def mesh(
         typer.Option("--threads", min=1, max=1024, help="CPU threads (default: all cores)."),
     ] = None,
     force: ForceFlag = False,
-    as_json: JsonFlag = False,
-    quiet: QuietFlag = False,
+    *,
+    printer: Printer,
 ) -> None:
     """Turn a trained run into a closed mesh in palette colours, with crisp borders.
 
@@ -61,7 +61,6 @@ def mesh(
     others = variants_of(trained, options.variants, nearest=options.nearest)
     if threads is not None:
         torch.set_num_threads(threads)
-    printer = Printer(as_json, quiet)
 
     def progress(step: str, done: float) -> None:
         printer.progress(f"{step} {done:.0%}")

@@ -11,15 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from toonset import lock
-from toonset.cli.common.output import (
-    OUTPUT_PANEL,
-    ForceFlag,
-    JsonFlag,
-    Printer,
-    QuietFlag,
-    VerboseFlag,
-    counted,
-)
+from toonset.cli.common.output import OUTPUT_PANEL, DetailPrinter, ForceFlag, Printer, counted
 from toonset.dataset.split_folder.options import CORRECTIONS
 from toonset.lock import FOLDERS
 from toonset.palette.options import CHOICE_PANEL, PaletteOptions
@@ -62,9 +54,8 @@ def palette(
         ),
     ] = None,
     force: ForceFlag = False,
-    as_json: JsonFlag = False,
-    quiet: QuietFlag = False,
-    verbose: VerboseFlag = False,
+    *,
+    printer: DetailPrinter,
 ) -> None:
     """List the colours that make up at least 5 % of the character, and label every pixel.
 
@@ -80,7 +71,6 @@ def palette(
     from toonset.palette.pixels.ink_lines import find_contours
     from toonset.write import new_folder
 
-    printer = Printer(as_json, quiet, verbose)
     places = inputs or [BUNDLE]
     given = None if corrections is None else Given.of(corrections)
     if given is not None:
@@ -136,8 +126,8 @@ def recolor(
         typer.Option("-o", "--out", help="Folder for the pictures.", rich_help_panel=OUTPUT_PANEL),
     ] = RECOLORED,
     force: ForceFlag = False,
-    as_json: JsonFlag = False,
-    quiet: QuietFlag = False,
+    *,
+    printer: Printer,
 ) -> None:
     """Write the drawings with some palette colours replaced, one PNG each.
 
@@ -150,7 +140,6 @@ def recolor(
     from toonset.palette.recolor import change_colors, recolor_drawing
     from toonset.write import new_folder, write_bytes
 
-    printer = Printer(as_json, quiet)
     places = inputs or [BUNDLE]
     check_pictures(places)
     read = [Path(os.path.abspath(place)) for place in places]

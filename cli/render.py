@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag, counted
+from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, Printer, counted
 from toonset.nerf.options import RenderOptions
 from toonset.write import check_output
 
@@ -34,8 +34,8 @@ def render(
         typer.Option("--threads", min=1, max=1024, help="CPU threads (default: all cores)."),
     ] = None,
     force: ForceFlag = False,
-    as_json: JsonFlag = False,
-    quiet: QuietFlag = False,
+    *,
+    printer: Printer,
 ) -> None:
     """Render a trained run: one PNG per camera and layer, SVG, and files of a whole turntable.
 
@@ -48,7 +48,6 @@ def render(
     view of `drawn` as smooth paths, too: a group per paint, and lines.
     """
     options.check()
-    printer = Printer(as_json, quiet)
     import torch
 
     from toonset.nerf.render.animation import ANIMATED_PX, check_mp4

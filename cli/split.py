@@ -18,7 +18,7 @@ from toonset.cli.common.outfits import (
     outfit_folders,
     print_results,
 )
-from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag
+from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, Printer
 from toonset.dataset.split_folder.options import SheetOptions
 
 if TYPE_CHECKING:
@@ -41,8 +41,8 @@ def split(
         Path, typer.Option("-o", "--out", help="Folder.", rich_help_panel=OUTPUT_PANEL)
     ] = Path("views"),
     force: ForceFlag = False,
-    as_json: JsonFlag = False,
-    quiet: QuietFlag = False,
+    *,
+    printer: Printer,
 ) -> None:
     """Cut the figures out of a sheet, and show what was found.
 
@@ -58,7 +58,6 @@ def split(
     from toonset.read import check_there
 
     replace(cut, outfit=first_row(cut.outfit, drop=cut.drop)).check()
-    printer = Printer(as_json, quiet)
     check_there(sheets, "picture", PictureError)
     check_there([cut.boxes], "boxes", SheetError)
     check_there([cut.matting], "matting network", PictureError)

@@ -12,9 +12,7 @@ from toonset.cli.common.flags import Given
 from toonset.cli.common.output import (
     OUTPUT_PANEL,
     ForceFlag,
-    JsonFlag,
     Printer,
-    QuietFlag,
     SeedOption,
     UpOption,
     counted,
@@ -53,8 +51,8 @@ def synth(
     up: UpOption = "y",
     seed: SeedOption = 0,
     force: ForceFlag = False,
-    as_json: JsonFlag = False,
-    quiet: QuietFlag = False,
+    *,
+    printer: Printer,
 ) -> None:
     """Draw a turnaround sheet of a mesh, with errors of a hand as asked, and write its truth.
 
@@ -71,7 +69,6 @@ def synth(
     from toonset.dataset.synthetic.files import write_turnaround
     from toonset.dataset.synthetic.turnaround import make_turnaround
 
-    printer = Printer(as_json, quiet)
     body = load_mesh(mesh, up=up)
     check_output(out, [mesh], WRITTEN, force=force)
     for remark in body.remarks:

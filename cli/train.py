@@ -8,14 +8,7 @@ from typing import Annotated
 import typer
 
 from toonset.cli.common.flags import Given
-from toonset.cli.common.output import (
-    OUTPUT_PANEL,
-    ForceFlag,
-    JsonFlag,
-    Printer,
-    QuietFlag,
-    VerboseFlag,
-)
+from toonset.cli.common.output import OUTPUT_PANEL, DetailPrinter, ForceFlag
 from toonset.cli.common.train_run import Request, run
 from toonset.nerf.options import PRESETS, PresetName, TrainOptions
 
@@ -68,9 +61,8 @@ def train(
         bool, typer.Option("--strict", help="Exit with 3 where the run is weak.")
     ] = False,
     force: ForceFlag = False,
-    as_json: JsonFlag = False,
-    quiet: QuietFlag = False,
-    verbose: VerboseFlag = False,
+    *,
+    printer: DetailPrinter,
 ) -> None:
     """Train a triplane radiance field and a palette classifier on the drawings of a bundle.
 
@@ -90,7 +82,7 @@ def train(
         palette=not no_palette,
         strict=strict,
     )
-    code = run(request, Printer(as_json, quiet, verbose))
+    code = run(request, printer)
     if code:
         raise typer.Exit(code)
 

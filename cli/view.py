@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag
+from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, Printer
 
 
 def view(
@@ -38,8 +38,8 @@ def view(
         ),
     ] = "",
     force: ForceFlag = False,
-    as_json: JsonFlag = False,
-    quiet: QuietFlag = False,
+    *,
+    printer: Printer,
 ) -> None:
     """Write a page that anyone can open: the character turns and takes other colours.
 
@@ -48,7 +48,6 @@ def view(
     renderings, and how sure every camera is. A bundle that is not trained yet shows its drawings,
     cameras and mannequin.
     """
-    printer = Printer(as_json, quiet)
     if out.suffix.lower() not in (".html", ".htm"):
         raise typer.BadParameter(f"{out}: a page's name ends in .html", param_hint="--out")
     from toonset.dataset.bundle.transforms_read import transforms_file

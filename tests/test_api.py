@@ -279,6 +279,9 @@ def test_a_mistake_is_one_error_with_the_commands_line(call, command, drawn, too
     assert str(error.value) == toonset(*command, "-o", "elsewhere", "--quiet").reason
 
 
+A_HAT: Any = "hat"  # no lock
+
+
 def test_arguments_that_contradict_each_other(drawn: Path, toonset: Any) -> None:
     with pytest.raises(ts.ToonsetError) as error:
         ts.split_sheet(drawn / "sheet.png", ts.SheetOptions(boxes="b.json", grid="5x1"))
@@ -286,7 +289,7 @@ def test_arguments_that_contradict_each_other(drawn: Path, toonset: Any) -> None
     assert str(error.value) in said
     assert "see `toonset split -h`" in said
     with pytest.raises(ts.ToonsetError, match="'hat' is none of yaw, elevation"):
-        ts.Hints(lock=("hat",)).check()
+        ts.Hints(lock=(A_HAT,)).check()
 
 
 def without_pen(field: Any) -> Any:

@@ -57,6 +57,7 @@ class Option:
         least, most: range, both included.
         in_degrees: radians in Python, degrees on the command line and in the range.
         listed: names joined by commas, not a flag for each.
+        any_case: capitals do not matter on the command line.
     """
 
     help: str
@@ -67,6 +68,7 @@ class Option:
     most: float | None = None
     in_degrees: bool = False
     listed: bool = False
+    any_case: bool = False
 
 
 @dataclass(frozen=True)
@@ -171,7 +173,7 @@ def check_ranges(options: Any, error: type[Exception] = UsageError, where: str =
             or a word that is not one of the choices.
     """
     for one in fields_of(options):
-        value = getattr(options, one.name)
+        value: Any = getattr(options, one.name)
         if value is None and one.is_optional:
             continue
         for each in value if one.is_tuple else (value,):
@@ -191,8 +193,8 @@ def _wrong(one: OptionField, value: Any) -> str | None:
         return None
     low = -MOST_NUMBER if option.least is None else option.least
     high = MOST_NUMBER if option.most is None else option.most
-    is_number = isinstance(value, Integral if one.kinds == (int,) else Real)
-    if is_number and low <= value <= high:  # NaN is in no range
+    numbers: Any = Integral if one.kinds == (int,) else Real
+    if isinstance(value, numbers) and low <= value <= high:  # NaN is in no range
         return None
     if option.least is None:
         return f"{value} is out of range; {high:.15g} is the most"

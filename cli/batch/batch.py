@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from toonset.cli.common.output import OUTPUT_PANEL, JsonFlag, Printer, QuietFlag, counted
+from toonset.cli.common.output import OUTPUT_PANEL, Printer, counted
 from toonset.errors import OutputError, ToonsetError, UsageError
 
 if TYPE_CHECKING:
@@ -168,8 +168,8 @@ def batch(
             help="Take a sheet of -o OUT out of table, page and data set: name or 'pattern*'.",
         ),
     ] = None,
-    as_json: JsonFlag = False,
-    quiet: QuietFlag = False,
+    *,
+    printer: Printer,
 ) -> None:
     """Run many sheets: calibrate, palette, train, render, each sheet into a folder of its own.
 
@@ -183,7 +183,6 @@ def batch(
     from toonset.cli.batch.stages import check_options, in_order
 
     os.environ["OMP_NUM_THREADS"] = "1"  # a sheet has one core; must precede torch
-    printer = Printer(as_json, quiet)
     if (status is not None) + (merge is not None) + bool(sheets or out or forget) > 1:
         raise UsageError("--status and --merge take the batch's folder, and nothing beside it")
     if status is not None:

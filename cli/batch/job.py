@@ -12,7 +12,6 @@ import contextlib
 import errno
 import faulthandler
 import hashlib
-import io
 import itertools
 import json
 import os
@@ -181,14 +180,15 @@ def _run_stage(job: Job, home: Path, stage: str, key: str) -> StageRow | Outcome
     print(command_of(stage, given, job.sheets, home), file=sys.stderr, flush=True)
     _forget_peak()
     began, cpu = time.monotonic(), time.process_time()
-    said, code, line, full, is_held = io.StringIO(), 0, "", False, False
+    said: Mapping[str, Any] = {}
+    code, line, full, is_held = 0, "", False, False
     inputs = Path(job.home, SCRATCH, "inputs", stage)
     places = (inputs / str(number) for number in itertools.count())
     try:
         sheets = job.sheets if STAGES[stage].after else _fetched(job.sheets, places)
         words = _fetched(given, places)
-        with lock.command(), contextlib.redirect_stdout(said):
-            code = run(stage, words, sheets, home)
+        with lock.command():
+            code, said = run(stage, words, sheets, home)
     except Exception as error:
         found = refusal(error)
         if found is None:
@@ -211,7 +211,7 @@ def _run_stage(job: Job, home: Path, stage: str, key: str) -> StageRow | Outcome
     if line:
         print(line, file=sys.stderr, flush=True)
         return replace(row, state="failed", error=line, log=last_lines(Path(job.home, LOG)))
-    verdict, facts = _facts(stage, json.loads(said.getvalue()))
+    verdict, facts = _facts(stage, said)
     output = _hash_output(home, stage)
     return replace(row, state="done", verdict=verdict, facts=facts, output=output)
 

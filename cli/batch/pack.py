@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, JsonFlag, Printer, QuietFlag, counted
+from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, Printer, counted
 from toonset.errors import OutputError, ToonsetError, UsageError
 from toonset.write import check_output, new_folder, write_bytes
 
@@ -77,8 +77,8 @@ def pack(
         ),
     ] = USUAL_MB,
     force: ForceFlag = False,
-    as_json: JsonFlag = False,
-    quiet: QuietFlag = False,
+    *,
+    printer: Printer,
 ) -> None:
     """Write the sheets of a batch that are done as one data set: pictures, cameras, palettes.
 
@@ -87,7 +87,7 @@ def pack(
     """
     from toonset.cli.batch.shards import check_parquet
 
-    printer, shares = Printer(as_json, quiet), _shares(split)
+    shares = _shares(split)
     if to == "parquet":
         check_parquet()
     _check_out(out, batch, force=force)

@@ -23,6 +23,7 @@ import typer
 
 from toonset.cli.common.body import is_no_body
 from toonset.cli.common.flags import arguments_of, each_of, verb_of
+from toonset.cli.common.output import Keeper
 from toonset.cli.common.refusals import refusal
 from toonset.dataset.split_folder.options import SheetOptions
 from toonset.errors import ToonsetError, UsageError, one_line
@@ -276,8 +277,10 @@ def files_among(values: Mapping[str, Any], words: Sequence[str], root: Path) -> 
     return found
 
 
-def run(stage: str, words: Sequence[str], sheets: Sequence[str], home: Path) -> int:
-    """Run a verb on a sheet; what it says for machines goes to standard output.
+def run(
+    stage: str, words: Sequence[str], sheets: Sequence[str], home: Path
+) -> tuple[int, dict[str, Any]]:
+    """Run a verb on a sheet.
 
     Args:
         stage: the verb.
@@ -286,7 +289,7 @@ def run(stage: str, words: Sequence[str], sheets: Sequence[str], home: Path) -> 
         home: the sheet's folder.
 
     Returns:
-        its exit code.
+        its exit code and its result, as `--json` prints it.
 
     Raises:
         Exception: what the verb raises.
@@ -296,13 +299,15 @@ def run(stage: str, words: Sequence[str], sheets: Sequence[str], home: Path) -> 
     reads: Any = home / verb.reads if verb.reads else [Path(sheet) for sheet in sheets]
     values[verb.argument] = [reads] if verb.argument == "inputs" else reads
     values |= {"out": home / verb.writes} if verb.has_out else {}
-    own = {"force": True, "as_json": True, "threads": 1}
+    keeper = Keeper()
+    own = {"force": True, "threads": 1, "printer": keeper}
     values |= {name: value for name, value in own.items() if name in values}
+    code = 0
     try:
         verb_of(_command(stage))(**values)
     except typer.Exit as leaving:
-        return leaving.exit_code
-    return 0
+        code = leaving.exit_code
+    return code, keeper.kept
 
 
 def command_of(stage: str, words: Sequence[str], sheets: Sequence[str], home: Path) -> str:

@@ -152,6 +152,7 @@ def _parameter(one: OptionField) -> inspect.Parameter:
         *flag_of(one).split(" "),
         help=option.help,
         metavar=metavar,
+        case_sensitive=not option.any_case,
         min=option.least,
         max=option.most,
         autocompletion=complete,

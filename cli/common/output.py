@@ -13,22 +13,9 @@ from typing import Annotated, Any, Literal, TextIO
 import typer
 
 from toonset.errors import printable
+from toonset.options import Option, described
 
 OUTPUT_PANEL = "Output"  # of the help
-JsonFlag = Annotated[
-    bool,
-    typer.Option("--json", help="Print one JSON object on stdout.", rich_help_panel=OUTPUT_PANEL),
-]
-QuietFlag = Annotated[
-    bool,
-    typer.Option(
-        "--quiet", "-q", help="Print results and reasons only.", rich_help_panel=OUTPUT_PANEL
-    ),
-]
-VerboseFlag = Annotated[
-    bool,
-    typer.Option("--verbose", "-v", help="Print the evidence, too.", rich_help_panel=OUTPUT_PANEL),
-]
 SeedOption = Annotated[
     int, typer.Option("--seed", help="Seed of everything random.", min=0, max=2**63 - 1)
 ]
@@ -44,12 +31,17 @@ SECONDS_BETWEEN_LOG_LINES = 5.0
 ERASE_LINE = "\r\x1b[K"
 
 
+@described
 @dataclass
 class Printer:
     """Printer of a command: `say` for people, `doubt` why exit 3, `result` once at the end."""
 
-    as_json: bool = False
-    quiet: bool = False
+    as_json: Annotated[
+        bool, Option("Print one JSON object on stdout.", flag="--json", panel=OUTPUT_PANEL)
+    ] = False
+    quiet: Annotated[
+        bool, Option("Print results and reasons only.", flag="--quiet -q", panel=OUTPUT_PANEL)
+    ] = False
     verbose: bool = False
     subject: str = ""  # begins every line for people
     _last: float = field(default=0.0)
@@ -85,13 +77,39 @@ class Printer:
         """Print the result: `values` as JSON with --json, else `text`."""
         self._clear()
         if self.as_json:
-            print(json.dumps(values, default=_plain))
+            print(as_json(values))
         elif text:
             print(_shown(text))
 
     def _clear(self) -> None:
         if not self.quiet and sys.stderr.isatty():
             say(ERASE_LINE)
+
+
+@described
+@dataclass
+class DetailPrinter(Printer):
+    """Printer of a command that has evidence to show."""
+
+    verbose: Annotated[
+        bool, Option("Print the evidence, too.", flag="--verbose -v", panel=OUTPUT_PANEL)
+    ] = False
+
+
+@dataclass
+class Keeper(DetailPrinter):
+    """Printer that keeps the result for its caller, as JSON has it."""
+
+    kept: dict[str, Any] = field(default_factory=dict)
+
+    def result(self, values: dict[str, Any], text: str) -> None:
+        """Keep the result."""
+        self.kept = json.loads(as_json(values))
+
+
+def as_json(values: dict[str, Any]) -> str:
+    """Return a result in one line, as `--json` prints it."""
+    return json.dumps(values, default=_plain)
 
 
 def lead_nowhere(stream: TextIO) -> None:

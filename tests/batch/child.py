@@ -5,22 +5,25 @@ import signal
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from toonset.cli.batch import job, on_ray, stages
 
 WELL_BEHAVED = on_ray.run_told
 
 
-def run(stage: str, words: Sequence[str], sheets: Sequence[str], home: Path) -> int:
+def run(
+    stage: str, words: Sequence[str], sheets: Sequence[str], home: Path
+) -> tuple[int, dict[str, Any]]:
     """Run a stage, or do what the sheet's name says."""
     if home.name.startswith("crash"):
         os.kill(os.getpid(), signal.SIGSEGV)
     if home.name.startswith("hang"):
         time.sleep(1e6)
-    code = stages.run(stage, words, sheets, home)
+    ran = stages.run(stage, words, sheets, home)
     with open(home.parents[1] / "completed", "a") as file:
         file.write(f"{home.name} {stage}\n")
-    return code
+    return ran
 
 
 def run_told(told: str) -> str:

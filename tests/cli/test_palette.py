@@ -1,15 +1,18 @@
 """`toonset palette` as a function: what it writes, into what, and what it refuses."""
 
 import json
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from toonset.camera import Camera
+from toonset.cli.common.output import DetailPrinter, Printer
 from toonset.cli.common.palette_text import palette_lines
-from toonset.cli.palette import palette, recolor
-from toonset.cli.split import split
+from toonset.cli.palette import palette as palette_verb
+from toonset.cli.palette import recolor as recolor_verb
+from toonset.cli.split import split as split_verb
 from toonset.dataset.bundle.read_scene import read_scene
 from toonset.dataset.bundle.transforms import transforms_dict
 from toonset.dataset.images.picture import encode_png, load_indexed_png, load_rgba
@@ -18,6 +21,8 @@ from toonset.palette.options import PaletteOptions
 from toonset.palette.palette import Evidence, Palette, PaletteColor
 from toonset.write import write_bytes, write_json
 
+palette = partial(palette_verb, printer=DetailPrinter())
+recolor, split = (partial(verb, printer=Printer()) for verb in (recolor_verb, split_verb))
 RED, BLUE = (200, 30, 40), (20, 60, 180)
 
 
@@ -52,7 +57,7 @@ def test_a_bundle_gets_its_palette_and_labels(tmp_path, monkeypatch, capsys):
     shown = capsys.readouterr().out.splitlines()
     colors = ["#c81e28   70.0 %  red", "#143cb4   30.0 %  blue"]
     assert shown == [*colors, "bundle: look at palette.png; next: toonset train bundle"]
-    palette(verbose=True)
+    palette(printer=DetailPrinter(verbose=True))
     shown = capsys.readouterr().out.splitlines()
     assert shown[:2] == colors
     assert shown[2].startswith("shares are of all the character's pixels; rule: at least 5 % of")
@@ -97,7 +102,11 @@ def test_pictures_go_into_a_folder_of_their_own(tmp_path, capsys):
     write_bytes(tmp_path / "front.png", encode_png(opaque))  # on white: the ground is cut away
     write_bytes(tmp_path / "back.png", encode_png(figure()))
     out = tmp_path / "colours"
-    palette([tmp_path / "front.png", tmp_path / "back.png"], out=out, as_json=True)
+    palette(
+        [tmp_path / "front.png", tmp_path / "back.png"],
+        out=out,
+        printer=DetailPrinter(as_json=True),
+    )
     result = json.loads(capsys.readouterr().out)
     assert [color["hex"] for color in result["colors"]] == ["#c81e28", "#143cb4"]
     assert tree(out) == {
@@ -118,7 +127,7 @@ def test_what_is_dropped_is_printed(tmp_path: Path, capsys: pytest.CaptureFixtur
     palette([bundle], PaletteOptions(min_share=0.5))
     said = capsys.readouterr().out
     assert "left out by the rule: #143cb4 blue (--keep '#143cb4' keeps one)\n" in said
-    palette([bundle], PaletteOptions(min_share=0.5), verbose=True)
+    palette([bundle], PaletteOptions(min_share=0.5), printer=DetailPrinter(verbose=True))
     lines = capsys.readouterr().out.splitlines()
     assert "rule: at least 50 % of the character's pixels" in lines[1]
     assert lines[2].startswith("left out")
@@ -218,7 +227,7 @@ def test_a_left_out_colour_can_be_kept(tmp_path: Path, capsys: pytest.CaptureFix
     rgba = outlined()
     rgba[20:24, 30:36, :3] = (250, 220, 50)
     write_bytes(tmp_path / "a.png", encode_png(rgba))
-    palette([tmp_path / "a.png"], out=tmp_path / "without", verbose=True)
+    palette([tmp_path / "a.png"], out=tmp_path / "without", printer=DetailPrinter(verbose=True))
     shown = capsys.readouterr().out
     assert "picture 0 at (30, 20), 6 x 4 px" in shown
     palette([tmp_path / "a.png"], options=PaletteOptions(keep="#fadc32"), out=tmp_path / "with")
@@ -286,7 +295,7 @@ def test_drawings_are_written_in_other_colours(tmp_path: Path) -> None:
     assert (new[red] == (0, 255, 0, 255)).all()
     assert np.array_equal(new[~red], figure()[~red])
     found = sorted((bundle / "images").iterdir())
-    recolor(["red=#00ff00"], found, tmp_path / "found", as_json=True)
+    recolor(["red=#00ff00"], found, tmp_path / "found", printer=Printer(as_json=True))
     assert np.array_equal(load_rgba(tmp_path / "found" / "000.png"), new)
 
 

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Container, Sequence
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 from toonset.cli.batch.dispatch import Limits, Runner, home_of
 from toonset.cli.batch.job import stages_there
@@ -21,7 +22,9 @@ count_in: Path | None = None  # which stages were run; None: OUT/runs
 CHOSEN = ("calibrate", "palette")
 
 
-def run(stage: str, words: Sequence[str], sheets: Sequence[str], home: Path) -> int:
+def run(
+    stage: str, words: Sequence[str], sheets: Sequence[str], home: Path
+) -> tuple[int, dict[str, Any]]:
     """Write what the stage would, or do what the sheet says; count it in `runs`."""
     made = home / "bundle" / "transforms.json"  # where the sheet is behind a URL
     text = (
@@ -40,9 +43,7 @@ def run(stage: str, words: Sequence[str], sheets: Sequence[str], home: Path) -> 
             write_json(folder / (verb.mark or "made.json"), [text, list(words)])
     else:
         write_json(home / verb.writes / verb.mark, [text, list(words)])
-    said = {"verdict": "ok", "reason": "", "views": [1], "colors": [1, 2]}
-    print(json.dumps(said))
-    return 0
+    return 0, {"verdict": "ok", "reason": "", "views": [1], "colors": [1, 2]}
 
 
 def _behave(what: str, home: Path) -> None:

@@ -29,6 +29,7 @@ from toonset.dataset.images.picture import encode_png
 from toonset.dataset.split_folder.load import split_sheet
 from toonset.dataset.split_folder.options import SheetOptions
 from toonset.errors import BundleError, SheetError, ToonsetError
+from toonset.options import Body
 
 Command = Any
 Outcome = Any
@@ -117,7 +118,7 @@ def test_folders_of_others_are_there_again_after_a_kill_while_bundles_changed_pl
         (bundle / name / "config.json").write_text("{}")
     with monkeypatch.context() as killed:
         killed.setattr(refit, "clear_workshop", lambda subject: None)
-        subject = Subject(bundle.parent / "sheet.png", None, bundle)
+        subject = Subject(bundle.parent / "sheet.png", Body.DEFAULT, bundle)
         new = Path(shutil.copytree(bundle, subject.workshop / "bundle"))
         shutil.rmtree(new / "run")
         shutil.rmtree(new / "test")
@@ -253,7 +254,7 @@ def test_a_bundle_of_another_outfit_is_opened_as_it_was_cut(tmp_path: Path) -> N
     options = {"outfit": "B"}
     views = split_sheet(sheet, SheetOptions(outfit="B")).views
     found = cast(CalibrationFile, SimpleNamespace(options=options, views=views))
-    _, corrections = opening._as_it_was_cut(Subject(sheet, None, tmp_path), found)
+    _, corrections = opening._as_it_was_cut(Subject(sheet, Body.DEFAULT, tmp_path), found)
     assert corrections == {"version": 1, "outfit": "B"}
 
 

@@ -5,13 +5,14 @@ import os
 from collections import Counter
 from dataclasses import replace
 from functools import cache
+from typing import get_args
 
 import numpy as np
 import pytest
 
 from toonset.dataset.mannequin.landmark_file import read_known_points
 from toonset.dataset.mannequin.make import HEIGHT, Mannequin, make_mannequin
-from toonset.dataset.mannequin.options import POSES, MannequinOptions
+from toonset.dataset.mannequin.options import MannequinOptions, Pose
 from toonset.dataset.mannequin.solids import blended, ellipsoid, joined, limb
 from toonset.dataset.mesh.load import load_mesh
 from toonset.errors import MeshError
@@ -135,7 +136,9 @@ def test_scales_widen_their_part(option, part, axis):
 
 
 def test_poses_raise_the_arms():
-    wrists = {pose: made(MannequinOptions(3.0, pose)).landmarks["left_wrist"] for pose in POSES}
+    wrists = {
+        pose: made(MannequinOptions(3.0, pose)).landmarks["left_wrist"] for pose in get_args(Pose)
+    }
     shoulder = made(MannequinOptions()).landmarks["left_shoulder"]
     assert wrists["T"][1] == pytest.approx(shoulder[1], abs=1e-3)
     assert wrists["T"][0] > wrists["A"][0] > wrists["relaxed"][0] > shoulder[0]
