@@ -28,7 +28,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from toonset import lock
-from toonset.cli.batch.stages import BUNDLE, STAGES, command_of, dependents, run, value_of
+from toonset.cli.batch.stages import BUNDLE, STAGES, dependents, line_of, run, value_of
 from toonset.cli.batch.table import StageRow
 from toonset.cli.common.refusals import refusal
 from toonset.errors import OutputError, ToonsetError, one_line, printable
@@ -177,7 +177,7 @@ def _run_stage(job: Job, home: Path, stage: str, key: str) -> StageRow | Outcome
     given = job.words.get(stage, ())
     row = StageRow(stage, key, attempts=1, worker=f"{os.uname().nodename}:{os.getpid()}")
     print(f"{BEGINS}{stage}", file=sys.stderr)
-    print(command_of(stage, given, job.sheets, home), file=sys.stderr, flush=True)
+    print(line_of(stage, given, job.sheets, home), file=sys.stderr, flush=True)
     _forget_peak()
     began, cpu = time.monotonic(), time.process_time()
     said: Mapping[str, Any] = {}

@@ -8,10 +8,11 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import importlib
+import inspect
 import json
 import pkgutil
 import shlex
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cache
@@ -22,7 +23,8 @@ from typing import Any
 import typer
 
 from toonset.cli.common.body import is_no_body
-from toonset.cli.common.flags import arguments_of, each_of, verb_of
+from toonset.cli.common.flags import arguments_of, command_of, each_of
+from toonset.cli.common.help import Verb
 from toonset.cli.common.output import Keeper
 from toonset.cli.common.refusals import refusal
 from toonset.dataset.split_folder.options import SheetOptions
@@ -36,9 +38,12 @@ PACKAGES = (  # whose versions results depend on
 )
 BUNDLE = "bundle"
 RUN = f"{BUNDLE}/run"
-OWN = ("out", "force", "as_json", "quiet", "verbose", "threads", "preview_every", "strict")
+OWN = ("out", "force", "printer", "threads", "preview_every", "strict")  # what a batch sets
+OWN_FLAGS = (
+    *("--out", "-o", "--force", "--json", "--quiet", "-q", "--verbose", "-v"),
+    *("--threads", "--preview-every", "--strict"),
+)
 FILE_OR_COLORS = ("colors", "keep", "palette", "variants")
-PLACE = Path("place")  # stands for a sheet's own folders while words are checked
 
 
 @dataclass(frozen=True)
@@ -150,7 +155,7 @@ def in_order(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def parse(stage: str, words: Sequence[str], where: str) -> dict[str, Any]:
-    """Return a verb's arguments for words as they are typed after it, defaults included.
+    """Return a verb's options for words as they are typed after it, defaults included.
 
     Args:
         stage: the verb.
@@ -160,22 +165,19 @@ def parse(stage: str, words: Sequence[str], where: str) -> dict[str, Any]:
     Raises:
         UsageError: the verb does not take them, or a batch sets them itself.
     """
-    verb, command = STAGES[stage], _command(stage)
-    own = [str(PLACE), *(("--out", str(PLACE)) if verb.has_out else ())]
+    command, typed = _command(stage), [*_usual(STAGES[stage], words), *words]
     try:
-        with _silent_help(command):
-            context = command.make_context(f"toonset {stage}", [*_usual(verb, words), *words, *own])
-            values = arguments_of(context)
+        context = command.make_context(f"toonset {stage}", typed, allow_extra_args=True)
+        values = arguments_of(context)
     except Exception as error:
+        if (flag := getattr(error, "option_name", "")) in OWN_FLAGS:
+            raise UsageError(f"{where}: {flag} is set by toonset batch; leave it out") from error
         said = refusal(error)
         if said is None:
             raise
         raise UsageError(f"{where}: {said}") from error
-    given = values.pop(verb.argument)
-    if given not in ([PLACE], PLACE):
+    if context.args:
         raise UsageError(f"{where}: {stage} reads the sheet's own; options only are taken here")
-    if typed := _typed(context, verb, words):
-        raise UsageError(f"{where}: {typed} is set by toonset batch; leave it out")
     return values
 
 
@@ -221,35 +223,17 @@ def _check_values(values: Mapping[str, Any]) -> None:
             parse_labels(options.labels, options.labels.count(",") + 1)
 
 
-def _typed(context: Any, verb: Stage, words: Sequence[str]) -> str:
-    """Return an option among words that is not theirs to give."""
-    for param in context.command.params:
-        flags = [*param.opts, *param.secondary_opts]
-        if param.name in OWN:
-            source = context.get_parameter_source(param.name)
-            ours = param.name == "out" and not any(
-                word.split("=")[0] in flags or word.startswith("-o") for word in words
-            )
-            if source is not None and source.name == "COMMANDLINE" and not ours:
-                return str(max(flags, key=len))
-    return ""
-
-
-@contextlib.contextmanager
-def _silent_help(command: Any) -> Iterator[None]:
-    """Refuse -h among words as any other unknown option."""
-    added, command.add_help_option = command.add_help_option, False
-    try:
-        yield
-    finally:
-        command.add_help_option = added
-
-
 @cache
 def _command(stage: str) -> Any:
-    from toonset.cli.main import app
+    """Return a command that takes the options of a verb which are not the batch's."""
+    own = typer.Typer(add_completion=False, rich_markup_mode=None)
+    without = (STAGES[stage].argument, *OWN)
+    own.command(stage, cls=Verb, add_help_option=False)(command_of(_verb(stage), without))
+    return typer.main.get_command(own)
 
-    return typer.main.get_command(app).commands[stage]  # type: ignore[attr-defined]
+
+def _verb(stage: str) -> Any:
+    return getattr(importlib.import_module(f"toonset.cli.{stage}"), stage)
 
 
 def value_of(word: str) -> str:
@@ -269,7 +253,7 @@ def files_among(values: Mapping[str, Any], words: Sequence[str], root: Path) -> 
     found = {}
     for name, value in each_of(values).items():
         for one in value if isinstance(value, list | tuple) else [value]:
-            text, is_path = str(one), isinstance(one, Path) and one != PLACE
+            text, is_path = str(one), isinstance(one, Path)
             if is_path and not (name == "mesh" and is_no_body(one)):
                 found[text] = typed.get(text, text)
             elif name in FILE_OR_COLORS and isinstance(one, str) and (root / one).is_file():
@@ -300,17 +284,18 @@ def run(
     values[verb.argument] = [reads] if verb.argument == "inputs" else reads
     values |= {"out": home / verb.writes} if verb.has_out else {}
     keeper = Keeper()
+    call, code = _verb(stage), 0
     own = {"force": True, "threads": 1, "printer": keeper}
-    values |= {name: value for name, value in own.items() if name in values}
-    code = 0
+    taken = inspect.signature(call).parameters
+    values |= {name: value for name, value in own.items() if name in taken}
     try:
-        verb_of(_command(stage))(**values)
+        call(**values)
     except typer.Exit as leaving:
         code = leaving.exit_code
     return code, keeper.kept
 
 
-def command_of(stage: str, words: Sequence[str], sheets: Sequence[str], home: Path) -> str:
+def line_of(stage: str, words: Sequence[str], sheets: Sequence[str], home: Path) -> str:
     """Return the command line that does what `run` does, for people."""
     verb = STAGES[stage]
     reads = [str(home / verb.reads)] if verb.reads else sheets

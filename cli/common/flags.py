@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum, StrEnum
 from pathlib import Path
@@ -41,15 +41,21 @@ class Given(Generic[Options]):
         return replace(base, **self.values)  # type: ignore[type-var]
 
 
-def command_of(verb: Callable[..., None]) -> Callable[..., None]:
+def command_of(verb: Callable[..., None], without: Container[str] = ()) -> Callable[..., None]:
     """Return a function for typer with a parameter for every flag of a verb.
 
     It is never called: `arguments_of` says what the verb is to be called with.
+
+    Args:
+        verb: the verb.
+        without: parameters of its own that a person is not asked for.
     """
     shown: dict[str, inspect.Parameter] = {}
     hints = get_type_hints(verb, include_extras=True)
     for name, parameter in inspect.signature(verb).parameters.items():
         options, _ = _options_in(hints[name])
+        if name in without:
+            continue
         if options is None:
             own = [parameter.replace(annotation=hints[name], kind=parameter.KEYWORD_ONLY)]
         else:
@@ -63,7 +69,7 @@ def command_of(verb: Callable[..., None]) -> Callable[..., None]:
     flags.__doc__, flags.__name__ = verb.__doc__, verb.__name__
     flags.__signature__ = inspect.Signature([*shown.values()])  # type: ignore[attr-defined]
     flags.__annotations__ = {name: one.annotation for name, one in shown.items()}
-    flags.verb = verb  # type: ignore[attr-defined]
+    flags.verb, flags.without = verb, without  # type: ignore[attr-defined]
     return flags
 
 
@@ -83,6 +89,8 @@ def arguments_of(context: Any) -> dict[str, Any]:
     hints, found = get_type_hints(verb, include_extras=True), {}
     lists = {param.name for param in context.command.params if _is_list(param)}
     for name in inspect.signature(verb).parameters:
+        if name in context.command.callback.without:
+            continue
         options, is_given = _options_in(hints[name])
         if options is None:
             value = values[name]
