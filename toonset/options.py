@@ -14,7 +14,7 @@ documentation, and `check_ranges` refuses what is out of range. Imports nothing 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import Field, dataclass, fields
 from enum import Enum
 from numbers import Integral, Real
@@ -108,12 +108,13 @@ class OptionField:
 
 def described(options: AnyClass) -> AnyClass:
     """Read what the fields of a dataclass are for, and add it to the class's documentation."""
-    read = tuple(_read(options))
+    hints = get_type_hints(options, include_extras=True)
+    read = tuple(_read(options, hints))
     options.__option_fields__ = read  # type: ignore[attr-defined]
     rows = "\n".join(f"    {one.name}: {_row(one)}" for one in read)
     options.__doc__ = f"{inspect.getdoc(options) or ''}\n\nAttributes:\n{rows}\n"
-    call = vars(options)["__init__"]
-    call.__annotations__ = get_type_hints(call)  # what a notebook shows of the call
+    plain = {name: get_args(hint)[0] if _is_said(hint) else hint for name, hint in hints.items()}
+    vars(options)["__init__"].__annotations__ = plain  # what a notebook shows of the call
     return options
 
 
@@ -128,8 +129,7 @@ def is_described(options: Any) -> bool:
     return isinstance(options, type) and hasattr(options, "__option_fields__")
 
 
-def _read(options: Any) -> Iterator[OptionField]:
-    hints = get_type_hints(options, include_extras=True)
+def _read(options: Any, hints: Mapping[str, Any]) -> Iterator[OptionField]:
     for field in fields(options):
         kind, *said = get_args(hints[field.name]) if _is_said(hints[field.name]) else (None,)
         for option in said:
@@ -173,10 +173,11 @@ def check_ranges(options: Any, error: type[Exception] = UsageError, where: str =
             or a word that is not one of the choices.
     """
     for one in fields_of(options):
-        value: Any = getattr(options, one.name)
+        value = getattr(options, one.name)
         if value is None and one.is_optional:
             continue
-        for each in value if one.is_tuple else (value,):
+        every: Any = value if one.is_tuple else (value,)
+        for each in every:
             if (wrong := _wrong(one, each)) is not None:
                 raise error(f"{where}{one.name}: {wrong}")
 

@@ -168,10 +168,10 @@ def test_landmarks_lie_where_they_should(options):
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        ({"heads_tall": 1.5}, "heads_tall is 1.5, 2 to 8 is possible"),
-        ({"heads_tall": float("nan")}, "heads_tall is nan"),
-        ({"limb_scale": 3.0}, "limb_scale is 3, 0.7 to 1.4 is possible"),
-        ({"pose": "Y"}, "pose 'Y' is unknown; choose T, A, relaxed"),
+        ({"heads_tall": 1.5}, "heads_tall: 1.5 is out of range; 2 is the least, 8 the most"),
+        ({"heads_tall": float("nan")}, "heads_tall: nan"),
+        ({"limb_scale": 3.0}, "limb_scale: 3.0 is out of range; 0.7 is the least"),
+        ({"pose": "Y"}, "pose: 'Y' is none of T, A, relaxed"),
     ],
 )
 def test_impossible_bodies_are_refused(wrong, words):
