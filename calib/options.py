@@ -161,22 +161,29 @@ class VerdictThresholds:
     most_landmarks_off: float = 0.05
 
 
+@described
 @dataclass(frozen=True)
 class CalibrationOptions:
-    """How hard to look, and what to doubt.
+    """How hard to look, and what to doubt."""
 
-    Attributes:
-        starts: coarse hypotheses per view; 6 reach the optimum of clean views always.
-        coarse_height_px: figure height while searching; 100 px see limbs, cost little.
-        fine_height_px: figure height of the final fit.
-        rounds: joint fits at most, when views change their candidate.
-        thresholds: of verdicts.
-        without: names of checks that are left out, of `toonset.calib.verdict.checks.CHECKS`.
-    """
-
-    starts: int = 6
-    coarse_height_px: float = 100.0
-    fine_height_px: float = 250.0
-    rounds: int = 3
-    thresholds: VerdictThresholds = VerdictThresholds()
-    without: tuple[str, ...] = ()
+    starts: Annotated[
+        int,
+        Option("Coarse hypotheses per view; 6 reach the optimum of clean views always.", flag=None),
+    ] = 6
+    coarse_height_px: Annotated[
+        float, Option("Figure height while searching; 100 px see limbs, cost little.", flag=None)
+    ] = 100.0
+    fine_height_px: Annotated[float, Option("Figure height of the final fit.", flag=None)] = 250.0
+    rounds: Annotated[
+        int, Option("Joint fits at most, when views change their candidate.", flag=None)
+    ] = 3
+    thresholds: Annotated[VerdictThresholds, Option("Of verdicts.", flag=None)] = (
+        VerdictThresholds()
+    )
+    without: Annotated[
+        tuple[str, ...],
+        Option(
+            "Names of checks that are left out, of `toonset.calib.verdict.checks.CHECKS`.",
+            flag=None,
+        ),
+    ] = ()

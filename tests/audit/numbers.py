@@ -6,11 +6,12 @@ import importlib
 import math
 from collections.abc import Iterator
 from functools import partial
-from typing import Any, get_args, get_type_hints
+from typing import Any, get_args
 
 from tests.audit.case import Case, Row, run_cases
 from tests.audit.documents import TRAIN
 from tests.audit.material import Material
+from toonset.cli.common.flags import command_of
 
 BEYOND = ("0", "-1", "1e400", "nan", "inf", "x", "", str(10**12), str(10**30))
 # What a verb needs besides; `edit` and `view` serve and draw for long where nothing is refused.
@@ -47,12 +48,13 @@ def options(material: Material) -> Iterator[Case]:
 
 def numeric_options(verb: str) -> Iterator[tuple[str, Any]]:
     """Yield a verb's options that take numbers, and the least number where there is one."""
-    function = getattr(importlib.import_module(f"toonset.cli.{verb}"), verb)
-    for name, hint in get_type_hints(function, include_extras=True).items():
+    flags = command_of(getattr(importlib.import_module(f"toonset.cli.{verb}"), verb))
+    for name, hint in flags.__annotations__.items():
         parts: list[Any] = [*get_args(hint), None, None]
         kind, option = parts[:2]
         if {int, float} & {kind, *get_args(kind)} and hasattr(option, "param_decls"):
-            yield next(iter(option.param_decls), f"--{name.replace('_', '-')}"), option.min
+            words = [word for word in (option.default, *option.param_decls) if word is not ...]
+            yield next(iter(words), f"--{name.replace('_', '-')}"), option.min
 
 
 def material_of(material: Material, folder: Any) -> None:
