@@ -318,13 +318,13 @@ NO_MEANING = [
     (lambda s, f: ts.render(f, ts.turntable(f, 1)[0]).picture("ink"), "no contour lines"),
 ]
 NO_OPTIONS = [
-    ({"steps": 0}, "steps: 0 is out of range; 1 is the least"),
+    ({"steps": 0}, "steps: 0 is out of range; give 1 to 10000000"),
     ({"seed": -1}, "seed: -1"),
     ({"seed": 2**70}, "seed: "),
     ({"budget_s": float("nan")}, "budget_s: nan"),
     ({"resolution": 0}, "resolution: 0"),
     ({"field": "bogus"}, "field: 'bogus' is none of auto, triplane"),
-    ({"steps": 10**30}, "1 is the least, 10000000 the most"),
+    ({"steps": 10**30}, "give 1 to 10000000"),
     ({"steps": 1.5}, "steps: 1.5 is out of range"),
     ({"fairing": "no"}, "fairing: 'no' is neither True nor False"),
     ({"device": "tpu"}, "device: 'tpu' is none of auto, cpu, cuda"),

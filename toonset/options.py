@@ -151,7 +151,7 @@ def _row(one: OptionField) -> str:
     said = [option.help]
     ends = [end for end in (option.least, option.most) if end is not None and end < MOST_NUMBER]
     if ends:
-        range_of = " to ".join(f"{end:.15g}" for end in ends) + " or more" * (len(ends) == 1)
+        range_of = " to ".join(_number(end) for end in ends) + " or more" * (len(ends) == 1)
         said.append(f"{range_of}{', in degrees' * option.in_degrees}.")
     if one.is_off:
         said.append(f"That is what False does: {option.flag}.")
@@ -187,9 +187,9 @@ def _wrong(one: OptionField, value: Any) -> str | None:
     option = one.option
     if one.choices and value not in one.choices:
         known = ", ".join(("None",) * one.is_optional + one.choices)
-        return f"{value!r} is none of {known}"
+        return f"{value!r} is none of {known}; choose one"
     if one.kinds == (bool,) and not isinstance(value, bool):
-        return f"{value!r} is neither True nor False"
+        return f"{value!r} is neither True nor False; give one"
     if option.least is None and option.most is None:
         return None
     low = -MOST_NUMBER if option.least is None else option.least
@@ -197,6 +197,11 @@ def _wrong(one: OptionField, value: Any) -> str | None:
     numbers: Any = Integral if one.kinds == (int,) else Real
     if isinstance(value, numbers) and low <= value <= high:  # NaN is in no range
         return None
-    if option.least is None:
-        return f"{value} is out of range; {high:.15g} is the most"
-    return f"{value} is out of range; {low:g} is the least, {high:.15g} the most"
+    if option.most is None and not (isinstance(value, numbers) and value > high):
+        return f"{value} is out of range; give {low:.15g} or more"
+    return f"{value} is out of range; give {low:.15g} to {_number(high)}"
+
+
+def _number(value: float) -> str:
+    """Return a bound as it is typed."""
+    return str(value) if isinstance(value, int) else f"{value:.15g}"

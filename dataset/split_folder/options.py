@@ -149,7 +149,7 @@ class SheetOptions:
         from toonset.dataset.split.figures.rows import Taken
 
         if self.group is not None and self.group < 1:
-            raise SheetError(f"--group: {self.group} is no group; the first one is 1")
+            raise SheetError(f"--group: {self.group} is no group; give 1 or more")
         letter = self.outfit.strip().upper()
         if letter and not re.fullmatch("[A-Z]", letter):
             raise SheetError(

@@ -117,7 +117,7 @@ class SynthOptions:
         for name, limit in most.items():
             if getattr(self, name) > limit:
                 said = f"synth: {name}: {getattr(self, name)} is out of range"
-                raise SheetError(f"{said}; {limit:g} is the most with the other options")
+                raise SheetError(f"{said}; give {limit:g} at most beside the other options")
         if self.background not in ("white", "transparent") and not HEX_COLOR.fullmatch(
             self.background
         ):

@@ -168,9 +168,9 @@ def test_landmarks_lie_where_they_should(options):
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        ({"heads_tall": 1.5}, "heads_tall: 1.5 is out of range; 2 is the least, 8 the most"),
+        ({"heads_tall": 1.5}, "heads_tall: 1.5 is out of range; give 2 to 8"),
         ({"heads_tall": float("nan")}, "heads_tall: nan"),
-        ({"limb_scale": 3.0}, "limb_scale: 3.0 is out of range; 0.7 is the least"),
+        ({"limb_scale": 3.0}, "limb_scale: 3.0 is out of range; give 0.7 to 1.4"),
         ({"pose": "Y"}, "pose: 'Y' is none of T, A, relaxed"),
     ],
 )

@@ -200,7 +200,7 @@ def test_exact_views_have_the_style_and_none_of_the_errors(body: Mesh) -> None:
 def test_impossible_habits_are_refused() -> None:
     with pytest.raises(SheetError, match="need paper, the background is transparent"):
         replace(SMALL, background="transparent")
-    with pytest.raises(SheetError, match=r"jpeg_quality: 101 is out of range; 0 is the least, 95"):
+    with pytest.raises(SheetError, match=r"jpeg_quality: 101 is out of range; give 0 to 95"):
         ArtistOptions(jpeg_quality=101)
     with pytest.raises(SheetError, match="field_height_fraction: nan"):
         BodyErrors(field_height_fraction=math.nan)

@@ -134,7 +134,7 @@ def test_same_seed_same_bytes(body: Mesh, made: Turnaround, tmp_path: Path, snap
 
 
 def test_what_a_studio_cannot_draw_is_refused() -> None:
-    with pytest.raises(SheetError, match="views: 9 is out of range; 8 is the most"):
+    with pytest.raises(SheetError, match="views: 9 is out of range; give 8 at most"):
         replace(SMALL, views=9)
     with pytest.raises(SheetError, match="need paper, the background is transparent"):
         replace(SMALL, background="transparent")

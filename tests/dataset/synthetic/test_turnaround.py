@@ -189,7 +189,7 @@ def test_unknown_part_names_those_there_are() -> None:
 
 
 def test_options_out_of_range_are_refused() -> None:
-    with pytest.raises(SheetError, match="views: 0 is out of range; 1 is the least, 360 the most"):
+    with pytest.raises(SheetError, match="views: 0 is out of range; give 1 to 360"):
         SynthOptions(views=0)
     with pytest.raises(SheetError, match="warp_percent: nan"):
         SynthOptions(warp_percent=math.nan)
