@@ -1,4 +1,4 @@
-"""What lies under the figures of a messy sheet: paper and shadows."""
+"""What lies under the figures of a messy sheet: paper, shadows and sketched ground."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ import colorsys
 
 import cv2
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, UInt8
 
 from bench.messy.figure import Rgb
 
 WHITE: Rgb = (255, 255, 255)
 CONTRAST = 45  # in some channel: what a painter leaves between a figure and its ground
 DARK = 110  # luma: on darker grounds black ink is hardly seen
+STROKES = ("hatching", "dry strokes", "dots")
 LIGHT = 170  # luma: on darker grounds pencil and coloured lines are hardly seen
 
 
@@ -91,6 +92,52 @@ def shadow(
     cv2.ellipse(layer, center, (int(half_w), int(half_h)), 0, 0, 360, 1.0, -1, cv2.LINE_AA)
     strength = float(rng.uniform(0.15, 0.5))
     return strength * cv2.GaussianBlur(layer, (0, 0), blur), center
+
+
+def stroke_look(ground: Rgb, ink: Rgb, rng: np.random.Generator) -> tuple[str, Rgb]:
+    """Return how a sheet sketches the ground, one of `STROKES`, and in which colour."""
+    style = str(rng.choice(STROKES))
+    warm = np.array(ground) * rng.uniform(0.6, 0.85) * np.array([1.0, 0.95, 0.88])
+    return style, _rgb(warm) if style == "dry strokes" else ink
+
+
+def ground_strokes(
+    width_px: int, height_px: int, style: str, rgb: Rgb, rng: np.random.Generator
+) -> tuple[UInt8[np.ndarray, "height width 4"], tuple[int, int]]:
+    """Return a sketched shadow under feet of a width, and its centre in it (x, y).
+
+    Args:
+        width_px: of the feet.
+        height_px: of the figure.
+        style: one of `STROKES`: hatching, dry strokes over a wash, or a spray of dots.
+        rgb: of the strokes.
+        rng: of everything random.
+    """
+    half_w = width_px * float(rng.uniform(0.5, 0.9))
+    half_h = height_px * float(rng.uniform(0.012, 0.035))
+    pad = 4
+    size = int(2 * half_w) + 2 * pad, int(2 * half_h) + 2 * pad
+    center = size[0] // 2, size[1] // 2
+    layer = np.zeros((size[1], size[0]), np.float32)
+    if style == "dry strokes":
+        wash = np.zeros_like(layer)
+        cv2.ellipse(wash, center, (int(half_w), int(half_h)), 0, 0, 360, 1.0, -1, cv2.LINE_AA)
+        layer = float(rng.uniform(0, 0.8)) * cv2.GaussianBlur(wash, (0, 0), half_h / 3)
+    for _ in range(int(rng.uniform(25, 70))):
+        x, y = rng.uniform(-1, 1, 2)
+        x *= np.sqrt(max(1 - y * y, 0))
+        long = 0.0 if style == "dots" else half_w * float(rng.uniform(0.05, 0.4))
+        left, right = center[0] + half_w * x - long / 2, center[0] + half_w * x + long / 2
+        row = center[1] + half_h * y
+        tilt = float(rng.uniform(-0.02, 0.02)) * long
+        thick = max(1, round(height_px * float(rng.uniform(0.001, 0.005))))
+        stroke = np.zeros_like(layer)
+        ends = (round(left), round(row - tilt)), (round(right), round(row + tilt))
+        cv2.line(stroke, *ends, 1.0, thick, cv2.LINE_AA)
+        layer = np.maximum(layer, float(rng.uniform(0.4, 1.0)) * np.clip(stroke, 0, 1))
+    alpha = np.rint(255 * np.clip(layer, 0, 1)).astype(np.uint8)
+    color = np.broadcast_to(np.array(rgb, np.uint8), (*alpha.shape, 3))
+    return np.dstack([color, alpha]), center
 
 
 def _tint(rng: np.random.Generator, value: float) -> Rgb:

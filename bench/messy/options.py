@@ -39,6 +39,7 @@ BESIDE = (
     "outfits",
     "glued study",
     "hand frame",
+    "ground strokes",
 )  # drawn alone; no part of a mixture
 DIFFICULTIES = (*GROUNDS, *OTHERS, *BESIDE)
 GROUND_SHARES = (0.25, 0.2, 0.15, 0.1, 0.15, 0.15)  # of a mixture
@@ -54,6 +55,7 @@ EXCLUSIVE = (
     ("open contour", "line art"),  # open contours are line art already
     ("overlap", "touching"),
     ("rows", "outfits"),
+    ("shadows", "ground strokes"),
 )
 
 

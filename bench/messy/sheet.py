@@ -17,7 +17,15 @@ from jaxtyping import UInt8
 from bench.cases.jpeg import through_jpeg
 from bench.messy.cast import brief_of, cast_of, compose_rows
 from bench.messy.figure import Canvas, Rgb, tight_window
-from bench.messy.ground import DARK, ground_colors, ground_picture, luma, shadow
+from bench.messy.ground import (
+    DARK,
+    ground_colors,
+    ground_picture,
+    ground_strokes,
+    luma,
+    shadow,
+    stroke_look,
+)
 from bench.messy.layout import Layout, Placed, lay_out
 from bench.messy.margins import Margins, furnish, plan_margins, rule_lines
 from bench.messy.options import GROUNDS, MessyOptions, checked, in_order, mixture
@@ -75,7 +83,7 @@ def make_messy_sheet(
     if kind != "transparent":
         paper = ground_picture(kind, ground, layout.size_wh, painting)
     canvas = Canvas(paper, layout.size_wh)
-    _paint(canvas, layout, margins, chosen, text_rgb, painting)
+    _paint(canvas, layout, margins, chosen, ground[0], text_rgb, painting)
     rgba = canvas.bytes()
     if "jpeg" in chosen:
         rgba = through_jpeg(rgba, int(painting.integers(JPEG_QUALITY[0], JPEG_QUALITY[1] + 1)))
@@ -88,14 +96,18 @@ def _paint(
     layout: Layout,
     margins: Margins,
     chosen: frozenset[str],
+    ground: Rgb,
     text_rgb: Rgb,
     rng: np.random.Generator,
 ) -> None:
     rule_lines(canvas, layout, chosen, text_rgb, rng)
-    if "shadows" in chosen:
-        for row in layout.rows:
-            for placed in row.items:
-                _cast_shadow(canvas, placed, row.ground, rng)
+    sketched = None
+    if "ground strokes" in chosen:
+        sketched = stroke_look(ground, _text_color(ground, rng), rng)
+    for row in layout.rows if chosen & {"shadows", "ground strokes"} else ():
+        for placed in row.items:
+            if placed.item.is_view:
+                _cast_shadow(canvas, placed, row.ground, sketched, rng)
     for row in layout.rows:
         for placed in row.items:
             if isinstance(placed.item.picture, np.ndarray):
@@ -107,14 +119,24 @@ def _paint(
     furnish(canvas, layout, margins, chosen, text_rgb, rng)
 
 
-def _cast_shadow(canvas: Canvas, placed: Placed, ground: int, rng: np.random.Generator) -> None:
-    if not placed.item.is_view:
-        return
+def _cast_shadow(
+    canvas: Canvas,
+    placed: Placed,
+    ground: int,
+    sketched: tuple[str, Rgb] | None,
+    rng: np.random.Generator,
+) -> None:
     feet = placed.item.rgba[-max(placed.item.rgba.shape[0] // 12, 1) :, :, 3].any(axis=0)
     columns = np.flatnonzero(feet)
     left, right = int(columns[0]), int(columns[-1])
-    layer, (cx, cy) = shadow(max(right - left, 12), rng)
-    canvas.darken(layer, placed.x + (left + right) // 2 - cx, ground - cy)
+    width, middle = max(right - left, 12), placed.x + (left + right) // 2
+    if sketched is not None:
+        tall = placed.item.rgba.shape[0]
+        strokes, (cx, cy) = ground_strokes(width, tall, *sketched, rng)
+        canvas.over(strokes, middle - cx, ground - cy)
+    else:
+        layer, (cx, cy) = shadow(width, rng)
+        canvas.darken(layer, middle - cx, ground - cy)
 
 
 def _text_color(ground: Rgb, rng: np.random.Generator) -> Rgb:

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Int, UInt8
 
+from toonset.dataset.split.background import difference
 from toonset.dataset.split.figures.blobs import (
     Blobs,
     add_blocks,
@@ -20,9 +21,17 @@ from toonset.dataset.split.figures.blobs import (
     remove_strangers,
 )
 from toonset.dataset.split.figures.frames import find_frames, find_strokes
+from toonset.dataset.split.figures.ground_strokes import find_ground_strokes
 from toonset.dataset.split.figures.grouping import HAND, SPECK
 from toonset.dataset.split.figures.open_outlines import LINE, Gap, close_outlines
-from toonset.dataset.split.figures.rows import Group, Taken, find_groups
+from toonset.dataset.split.figures.rows import (
+    LEAST_ROW,
+    Group,
+    Taken,
+    find_groups,
+    likeness,
+    outline,
+)
 from toonset.dataset.split.figures.shadows import find_shadows
 from toonset.dataset.split.touching.cut import Cut, part_touching
 from toonset.raster import connected_to, dilate, parts, wider_than
@@ -31,6 +40,9 @@ from toonset.view import Box
 MOST_LOST = 0.2  # of a figure that a shadow alone encloses
 LEAST_LOST = 0.01  # of the same, where the shadow is mostly lines
 MOST_BROAD = 0.5  # of a shadow that is mostly lines
+GREY = 24  # levels between a colour's channels: ink and its soft edges have less
+COLORED = 0.3  # of a figure: it is painted
+SAME_POSE = 0.65  # IoU of its outline with the most like other one
 PAINTED = 0.5  # of a figure that is paint broader than lines: it is no line drawing
 
 
@@ -94,6 +106,13 @@ class SheetState:
         """Return the cells that are paper if the outside reaches them."""
         free = ~self.painted | self.ruled | self.shadow
         return free if self.filled is None else free & ~self.filled
+
+    @property
+    def contrast(self) -> UInt8[np.ndarray, "rows columns"]:
+        """Return the levels between every cell and the background; on transparency, its alpha."""
+        if self.ground is None:
+            return self.rgba[..., 3]
+        return difference(self.rgba[..., :3], self.ground)
 
     def without_lines(self, lines: Bool[np.ndarray, "rows columns"]) -> SheetState:
         """Return the sheet with more lines taken for paper."""
@@ -179,11 +198,13 @@ def _are_painted(state: SheetState) -> bool:
 
 
 def remove_shadows(state: SheetState) -> SheetState | None:
-    """Propose figures without the shadows that they cast."""
+    """Propose figures without the shadows that they cast, and without sketched ground."""
     if not len(state.main_blobs):  # specks alone cast none
         return None
     seen = state.rgba, state.ground, state.tolerance
     shadow = find_shadows(state.blobs, state.main_blobs, *seen)
+    painted = state.painted & ~state.ruled & ~shadow
+    shadow |= find_ground_strokes(state.blobs, state.main_blobs, painted, state.contrast)
     shadow = shadow & ~_outlines(state, shadow)  # a pencil's grey
     return replace(state, shadow=shadow).with_paper() if shadow.any() else None
 
@@ -216,9 +237,35 @@ def add_blocky_figures(state: SheetState) -> SheetState | None:
 
 
 def drop_strangers(state: SheetState) -> SheetState | None:
-    """Propose smaller figures in other colours, such as weapons, as no views."""
+    """Propose smaller figures in other colours as no views, and a painted one among line drawings.
+
+    So a sword is none, nor is an illustration in another pose beside a turnaround.
+    """
     main_blobs = remove_strangers(state.blobs, state.main_blobs, state.painted, state.rgba[..., :3])
+    main_blobs = main_blobs[~_painted_alone(state, main_blobs)]
     return replace(state, bodies=main_blobs) if len(main_blobs) < len(state.main_blobs) else None
+
+
+def _painted_alone(
+    state: SheetState, numbers: Int[np.ndarray, " bodies"]
+) -> Bool[np.ndarray, " bodies"]:
+    """Return which figure is painted among line drawings, in a pose that none of them has.
+
+    Where one has it, a drawing of a turnaround is coloured.
+    """
+    nothing = np.zeros(len(numbers), dtype=bool)
+    if len(numbers) < LEAST_ROW:
+        return nothing
+    masks = [state.blobs.mask(int(number)) for number in numbers]
+    windows = [state.rgba[state.blobs.window(int(number))][..., :3] for number in numbers]
+    colored = np.array(
+        [(np.ptp(rgb[m], axis=1) > GREY).mean() for rgb, m in zip(windows, masks, strict=True)]
+    )
+    painted = colored > COLORED
+    if painted.sum() != 1 or colored[~painted].max() > COLORED / 2:
+        return nothing
+    alike = likeness([outline(mask) for mask in masks])
+    return painted & (alike < SAME_POSE)
 
 
 CORRECTIONS: Mapping[str, Callable[[SheetState], SheetState | None]] = {

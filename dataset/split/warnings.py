@@ -6,13 +6,13 @@ from itertools import combinations
 
 import cv2
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Int, UInt8
 
 from toonset.dataset.split.background import SURE_ENOUGH, Background, ring_of
 from toonset.dataset.split.figures.blobs import find_blobs, shared_colors
 from toonset.dataset.split.figures.open_outlines import LINE, Gap
 from toonset.dataset.split.figures.parts_in_doubt import ALIKE, LEVEL, parts_in_doubt
-from toonset.dataset.split.figures.rows import LEAST_ROW, LOWEST, OFF_ROW, likeness, outline
+from toonset.dataset.split.figures.rows import LOWEST, OFF_ROW
 from toonset.dataset.split.figures.shadows import dimmed, see_through
 from toonset.dataset.split.pages import Pages
 from toonset.dataset.split.segment import SheetLayout, figure_cells
@@ -26,12 +26,12 @@ NEARLY_A_VIEW = 0.5  # of the views' height: something left out that may be a sm
 PROPORTIONS = 1.2  # times the widest view's, or less than its inverse of the narrowest's: no view
 BROAD = 1.15  # times its own height: wider than arms reach
 IN_EACH_OTHER = 0.45  # of the smaller one's box
-GREY = 24  # levels between a colour's channels: ink and its soft edges have less
-COLORED = 0.3  # of a view: it is painted
-SAME_POSE = 0.65  # IoU of its outline with the most like other one
 LEAST_SHADOW = 0.02  # of the height: so much lower than its row
 SHADED = 0.9  # of what is lower: it is shadow
 AS_LIKELY = 0.6  # of the merit of the group that was taken: another may be the turnaround
+EVEN = 0.85  # of the other's height: two views of one figure differ by less
+UPRIGHT = 1.4  # times its width: a standing figure is higher, a head is not
+SMALL = 0.25  # of a single view's height: small whole figures beside it may be the turnaround
 WHOLE = 0.6  # of the sheet that one view's box covers though there is text beside it
 WIDE_GAP = 0.05  # of the figure's height: a wider gap may be meant
 LARGE_POCKET = 0.01  # of the figure's squared height: so much more or less changes it
@@ -147,8 +147,8 @@ def figure_warnings(
         *_wide_views(views),
         *_two_heads(views),
         *_off_row(views),
+        *_uneven_pair(views),
         *_one_in_another(views),
-        *_painted_alone(views),
         *_whole_page(found, views, rgba),
         *_panels(views, rgba),
         *parts_in_doubt(
@@ -289,6 +289,20 @@ def _off_row(views: list[View]) -> list[str]:
     return said
 
 
+def _uneven_pair(views: list[View]) -> list[str]:
+    """Return a line if there are two views and one is much lower: no row tells which is right."""
+    if len(views) != 2:
+        return []
+    low, high = sorted(views, key=lambda view: view.figure_box[3])
+    share = low.figure_box[3] / high.figure_box[3]
+    if share >= EVEN:
+        return []
+    return [
+        f"view {low.name} is {100 * share:.0f} % as high as {high.name}: are both whole figures of "
+        "one character?"
+    ]
+
+
 def _one_in_another(views: list[View]) -> list[str]:
     """Return a line for every two views whose boxes lie far in each other: one was cut in two."""
     said = []
@@ -301,25 +315,6 @@ def _one_in_another(views: list[View]) -> list[str]:
         ):
             said.append(f"views {one.name} and {other.name} lie in each other: are they two?")
     return said
-
-
-def _painted_alone(views: list[View]) -> list[str]:
-    """Return a line for a painted view among line drawings if its outline is like none of theirs.
-
-    Where it is, one drawing of a turnaround is coloured.
-    """
-    colored = [float((np.ptp(view.rgba[view.mask][:, :3], axis=1) > GREY).mean()) for view in views]
-    painted = [number for number, share in enumerate(colored) if share > COLORED]
-    if len(views) < LEAST_ROW or len(painted) != 1 or sorted(colored)[-2] > COLORED / 2:
-        return []
-    outlines = []
-    for view in views:
-        left, top, width, height = view.figure_box
-        x, y = left - view.box[0], top - view.box[1]
-        outlines.append(outline(view.mask[y : y + height, x : x + width]))
-    if likeness(outlines)[painted[0]] >= SAME_POSE:
-        return []
-    return [f"view {views[painted[0]].name} alone is painted, in another pose: is it a view?"]
 
 
 def _beside_row(top: int, height: int, views: list[View]) -> tuple[float, float]:
@@ -363,14 +358,24 @@ def _other_groups(found: SheetLayout) -> list[str]:
     taken = found.groups[found.taken.group]
     said = []
     for number, group in enumerate(found.groups):
-        if group is taken or group.merit < AS_LIKELY * taken.merit or found.taken.group:
+        boxes = found.blobs.boxes[group.members]
+        turned = len(taken.members) == 1 and _has_whole(boxes, taken.height)
+        if group is taken or found.taken.group:
             continue
-        x, y = (int(v) * found.cell_px for v in found.blobs.boxes[group.members, :2].min(axis=0))
+        if not turned and group.merit < AS_LIKELY * taken.merit:
+            continue
+        x, y = (int(v) * found.cell_px for v in boxes[:, :2].min(axis=0))
         said.append(
             f"{len(group.members)} drawings from {x}, {y} on may be the turnaround, too: take "
             f"them with --group {number + 1}"
         )
     return said
+
+
+def _has_whole(boxes: Int[np.ndarray, "figures 4"], tall: float) -> bool:
+    """Return whether several drawings beside a single, larger one are whole figures."""
+    slender = boxes[:, 3] >= UPRIGHT * boxes[:, 2]
+    return bool((slender & (boxes[:, 3] >= SMALL * tall)).sum() > 1)
 
 
 def _like_views(

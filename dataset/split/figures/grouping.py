@@ -182,15 +182,15 @@ def _is_part(blobs: Blobs, number: int, body: int, gap: float, rgb: np.ndarray) 
     area = blobs.areas[number] / blobs.areas[body]
     if area > PART_AREA:
         return False
+    square = blobs.areas[number] >= SWATCH * own[2] * own[3]
     if _share_within(own, main) >= WITHIN:
-        near, large = gap <= NEAR * main[3], area >= LEAST_PART
+        near, large = gap <= NEAR * main[3], area >= LEAST_PART and not square
         return bool(near or (large and gap <= BESIDE * main[3]))
-    if blobs.areas[number] >= SWATCH * own[2] * own[3]:
+    if square:
         return False
     middle = own[0] + own[2] / 2
     above = main[0] <= middle <= main[0] + main[2]
-    aside = own[0] >= main[0] + main[2] or own[0] + own[2] <= main[0]
-    if aside and area > HAND and gap > TOUCHING * main[3]:
+    if not above and area > HAND and gap > TOUCHING * main[3]:
         return False
     lettering = _is_lettering(blobs, number, body, rgb)
     below = own[1] >= main[1] + main[3]

@@ -20,6 +20,8 @@ from toonset.dataset.split.figures.text_and_swatches import find_letters
 
 LOWEST = 0.75  # of the group's median height: lower drawings are studies or props
 HIGHEST = 1.45  # of the same: higher ones, too
+HOLLOW = 0.03  # of its box that a patch covers: it is a line round something
+SLENDER = 0.06  # of its longer side: a drawing is no narrower
 LARGE = 0.02  # of the largest patch's area: smaller things make no group
 OFF_ROW = 0.05  # of their height: the figures of a row stand on one line
 LEAST_ROW = 3  # figures on one line: they make a row
@@ -119,7 +121,11 @@ def _candidates(blobs: Blobs) -> Int[np.ndarray, " candidates"]:
     """Return the patches that may be figures."""
     large = np.flatnonzero(blobs.areas >= LEAST_SPECK)
     letters = np.zeros(len(blobs.areas), dtype=bool)
-    letters[large] = find_letters(blobs.boxes[large], int(blobs.boxes[:, 3].max(initial=0)))
+    lines = _are_lines(blobs)
+    if not lines[large].all():
+        large = large[~lines[large]]
+    tallest = int(blobs.boxes[large, 3].max(initial=0))
+    letters[large] = find_letters(blobs.boxes[large], tallest)
     fill = blobs.areas / (blobs.boxes[:, 2] * blobs.boxes[:, 3])
     drawn = large[~letters[large]]
     figurative = drawn[fill[drawn] < RECTANGLE]
@@ -128,6 +134,13 @@ def _candidates(blobs: Blobs) -> Int[np.ndarray, " candidates"]:
             areas = blobs.areas[candidates]
             return candidates[areas >= LARGE * areas.max()]
     return large
+
+
+def _are_lines(blobs: Blobs) -> Bool[np.ndarray, " blobs"]:
+    """Return which patches are pieces of a line round the page, drawn by hand: no figure is so."""
+    short, long = blobs.boxes[:, 2:].min(axis=1), blobs.boxes[:, 2:].max(axis=1)
+    hollow = blobs.areas < HOLLOW * short * long
+    return np.asarray(hollow | (short < SLENDER * long))
 
 
 def _of_one_height(blobs: Blobs, row: Int[np.ndarray, " row"]) -> list[Int[np.ndarray, " figures"]]:

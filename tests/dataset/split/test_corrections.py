@@ -1,5 +1,7 @@
 """Corrections of a sheet's first look: each can be left out, and is missed where it is needed."""
 
+import cv2
+import numpy as np
 import pytest
 
 from bench.messy.sheet import make_messy_sheet
@@ -10,7 +12,12 @@ from toonset.errors import SheetError
 
 @pytest.mark.parametrize(
     ("difficulty", "seed", "correction"),
-    [("shadows", 0, "shadows"), ("touching", 0, "touching figures"), ("hand frame", 4, "frames")],
+    [
+        ("shadows", 0, "shadows"),
+        ("ground strokes", 1390503441, "shadows"),
+        ("touching", 0, "touching figures"),
+        ("hand frame", 4, "frames"),
+    ],
 )
 def test_a_sheet_that_needs_a_correction_misses_it(
     difficulty: str, seed: int, correction: str
@@ -34,3 +41,15 @@ def test_a_correction_that_is_none_is_refused() -> None:
         SheetError, match="no correction 'shade'; choose from frames, open outlines, shadows"
     ):
         split_picture(rgba, PictureOptions(without=("shade",)))
+
+
+@pytest.mark.parametrize("posed", [False, True])
+def test_a_painted_drawing_in_another_pose_among_line_drawings_is_no_view(posed: bool) -> None:
+    page = np.full((400, 900, 4), 255, np.uint8)
+    for number, x in enumerate((120, 370, 620)):
+        paint = (40, 110, 200, 255) if number == 0 else (255, 255, 255, 255)
+        tilt = 40 if posed and number == 0 else 0
+        axes = (60, 150) if not tilt else (90, 170)
+        cv2.ellipse(page, (x, 200), axes, tilt, 0, 360, paint, -1)
+        cv2.ellipse(page, (x, 200), axes, tilt, 0, 360, (10, 10, 10, 255), 4)
+    assert len(split_picture(page).views) == (2 if posed else 3)

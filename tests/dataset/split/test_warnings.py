@@ -151,19 +151,19 @@ def test_figures_over_the_edge_explain_a_little_of_the_border(
     assert bool(border_warnings(replace(ground, sure=sure), found)) == doubted
 
 
-@pytest.mark.parametrize(("posed", "doubted"), [(False, False), (True, True)])
-def test_one_painted_view_among_line_drawings_is_doubted_in_another_pose(
-    posed: bool, doubted: bool
-) -> None:
-    page = np.full((400, 900, 4), 255, np.uint8)
-    for number, x in enumerate((120, 370, 620)):
-        paint = (40, 110, 200, 255) if number == 0 else (255, 255, 255, 255)
-        tilt = 40 if posed and number == 0 else 0
-        axes = (60, 150) if not tilt else (90, 170)
-        cv2.ellipse(page, (x, 200), axes, tilt, 0, 360, paint, -1)
-        cv2.ellipse(page, (x, 200), axes, tilt, 0, 360, (10, 10, 10, 255), 4)
-    said = any("alone is painted" in line for line in split_picture(page).warnings)
-    assert said is doubted
+def test_two_views_of_which_one_is_much_lower_are_doubted() -> None:
+    for height, doubted in ((225, True), (270, False)):
+        page = sheet_of(figure(280, (200, 40, 40)), figure(height, (200, 40, 40)))
+        sheet = split_picture(page)
+        assert len(sheet.views) == 2
+        assert any("as high as" in line for line in sheet.warnings) is doubted
+
+
+def test_small_whole_figures_beside_a_single_large_one_may_be_the_turnaround() -> None:
+    small = [cv2.resize(figure(280, (200, 40, 40)), (44, 110)) for _ in range(2)]
+    sheet = split_picture(sheet_of(figure(290, (200, 40, 40)), *small))
+    assert len(sheet.views) == 1
+    assert any("2 drawings from" in line and "--group 2" in line for line in sheet.warnings)
 
 
 @pytest.mark.parametrize(("shift", "doubted"), [(70, True), (140, False)])
