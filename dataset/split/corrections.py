@@ -20,6 +20,7 @@ from toonset.dataset.split.figures.blobs import (
     find_blobs,
     remove_strangers,
 )
+from toonset.dataset.split.figures.construction_lines import find_construction_lines
 from toonset.dataset.split.figures.frames import find_frames, find_strokes
 from toonset.dataset.split.figures.ground_strokes import find_ground_strokes
 from toonset.dataset.split.figures.grouping import HAND, SPECK
@@ -223,6 +224,12 @@ def _outlines(
     return shadow & np.append(False, lost > np.where(thin, LEAST_LOST, MOST_LOST) * areas)[labels]
 
 
+def remove_construction_lines(state: SheetState) -> SheetState | None:
+    """Propose figures without the ends of construction lines that stick out of them."""
+    lines = find_construction_lines(state.blobs, state.main_blobs)
+    return replace(state, ruled=state.ruled | lines).with_paper() if lines.any() else None
+
+
 def cut_touching_figures(state: SheetState) -> SheetState | None:
     """Propose touching figures apart."""
     painted = state.painted & ~state.ruled & ~state.shadow
@@ -272,6 +279,7 @@ CORRECTIONS: Mapping[str, Callable[[SheetState], SheetState | None]] = {
     "frames": remove_frames,
     "open outlines": fill_open_outlines,
     "shadows": remove_shadows,
+    "construction lines": remove_construction_lines,
     "touching figures": cut_touching_figures,
     "blocky figures": add_blocky_figures,
     "strangers": drop_strangers,

@@ -23,8 +23,8 @@ PALE = 0.5  # of the feet's contrast with the paper: a wash has less
 BESIDE = 0.25  # of the figure's width on both sides: so far ground reaches beyond its box
 MOSTLY = 0.5  # of a wash, among the strokes
 SPREAD = 0.04  # of the height, columns of ground away from the feet
-SCATTERED = 4  # pieces away from the feet: a tail, a staff's tip and toes are fewer
-WASHED = 0.5  # of what lies away from the feet: pale and in one piece, it is a wash
+SCATTERED = 4  # strokes away from the feet: a tail, a staff's tip and toes are fewer
+BROAD = 0.2  # of the height, a wash under the feet: a pale shoe is shorter
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,14 +34,14 @@ class Ground:
     Attributes:
         mask: its pixels.
         spread: its columns away from the feet, of the figure's height.
-        pieces: those of it that lie away from the feet.
-        washed: how much of it there is pale.
+        strokes: how many lie away from the feet.
+        broad: width of its widest wash, of the figure's height.
     """
 
     mask: Bool[np.ndarray, "height width"]
     spread: float = 0.0
-    pieces: int = 0
-    washed: float = 0.0
+    strokes: int = 0
+    broad: float = 0.0
 
 
 def find_ground_strokes(
@@ -67,9 +67,9 @@ def find_ground_strokes(
         paint = painted[window] & (own | ~bodies[window])
         ground = _ground_of(own, paint, contrast[window], int(blobs.boxes[number, 3]))
         found[window] |= ground.mask
-        each.append((ground.spread, ground.pieces, ground.washed))
-    spread, pieces, washed = np.median(each, axis=0)
-    drawn = spread >= SPREAD and (pieces >= SCATTERED or washed >= WASHED)
+        each.append((ground.spread, ground.strokes, ground.broad))
+    spread, strokes, broad = np.median(each, axis=0)
+    drawn = spread >= SPREAD and (strokes >= SCATTERED or broad >= BROAD)
     return found if drawn else np.zeros_like(found)
 
 
@@ -120,12 +120,14 @@ def _ground_of(
     bottom = int(np.flatnonzero(feet.any(axis=1))[-1])
     beside = pieces.boxes[:, 1] <= bottom + by  # lower ones are letters
     away &= np.append(False, beside)[pieces.labels]
+    thick = np.unique(pieces.labels[wider_than(away, by)])
+    strokes = beside.sum() - np.count_nonzero(beside[thick[thick > 0] - 1])
     below = find_blobs(ground)
     return Ground(
         ground & np.append(False, below.boxes[:, 1] <= bottom + by)[below.labels],
         float(away.any(axis=0).sum()) / tall,
-        int(beside.sum()),
-        float((away & wash).sum() / max(away.sum(), 1)),
+        int(strokes),
+        float(find_blobs(wash).boxes[:, 2].max(initial=0)) / tall,
     )
 
 

@@ -12,7 +12,8 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Int, UInt8
 
-from toonset.dataset.split.figures.blobs import Blobs
+from toonset.dataset.split.figures.blobs import Blobs, as_box
+from toonset.dataset.split.figures.rows import likeness, outline
 from toonset.dataset.split.touching.costs import look_at
 from toonset.dataset.split.touching.profiles import flanks, largest_piece
 from toonset.dataset.split.touching.selection import Option, best_option, find_options
@@ -25,6 +26,7 @@ NARROW = 0.3  # times its own height: what is narrower is one figure
 LEAST_HEIGHT = 24  # cells: in a lower patch no two figures can be told
 THROUGH = 0.7  # of an enclosed patch's height that a cut runs through: a gap between two figures
 MOST_ENCLOSED = 0.25  # of a patch in the background's colour: more is a line drawing
+SAME = 0.75  # IoU of two outlines, mirrored or not: both patches are one figure
 SURE = 0.9  # chance of being right: a cut that has less is worth a look
 
 
@@ -99,11 +101,47 @@ def part_touching(
         painted: pixels that are not of the background's colour.
         rgb: the sheet.
     """
+    parted, cuts = _part_all(blobs, main_blobs, main_blobs, painted, rgb)
+    in_two = {cut.box for cut in cuts if cut.made and cut.study is None}
+    whole = _wholes(blobs, main_blobs, in_two)
+    if len(whole):
+        able = np.setdiff1d(main_blobs, whole)
+        parted, cuts = _part_all(blobs, main_blobs, able, painted, rgb)
+    return parted, cuts
+
+
+def _wholes(
+    blobs: Blobs, main_blobs: Int[np.ndarray, " main_blobs"], cut: set[Box]
+) -> Int[np.ndarray, " wholes"]:
+    """Return the patches that were cut although one that was not cut has the same outline.
+
+    Both are one figure, such as a broad one that is symmetric, from the front and from behind.
+    """
+    is_cut = np.array([as_box(blobs.boxes[number]) in cut for number in main_blobs], dtype=bool)
+    if is_cut.all() or not is_cut.any():
+        return main_blobs[:0]
+    outlines = [outline(blobs.mask(int(number))) for number in main_blobs]
+    single = [outlines[i] for i in np.flatnonzero(~is_cut)]
+    alike = [
+        bool(cut and max(likeness([own, other])[0] for other in single) >= SAME)
+        for own, cut in zip(outlines, is_cut, strict=True)
+    ]
+    return main_blobs[np.array(alike)]
+
+
+def _part_all(
+    blobs: Blobs,
+    main_blobs: Int[np.ndarray, " main_blobs"],
+    able: Int[np.ndarray, " able"],
+    painted: Bool[np.ndarray, "height width"],
+    rgb: UInt8[np.ndarray, "height width 3"],
+) -> tuple[Blobs, list[Cut]]:
+    """Return `part_touching` of the patches that are able to be several figures."""
     cuts = list[Cut]()
     patches = _Patches(blobs.labels.copy(), painted, rgb, {}, {})
     for number in main_blobs:
         patches.measure(int(number) + 1, blobs.window(int(number)))
-    queue, top = list(patches.boxes), len(blobs.areas)
+    queue, top = [int(number) + 1 for number in able], len(blobs.areas)
     while queue:
         label = queue.pop()
         box = patches.boxes[label]

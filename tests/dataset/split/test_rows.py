@@ -130,3 +130,15 @@ def test_what_stands_beside_a_figure_and_is_larger_than_a_hand_is_no_part(
     widths = [view.figure_box[2] for view in found.views]
     assert (widths[2] > widths[0] + 2) is is_part
     assert any("apart from view 002.png" in line for line in found.warnings) is is_part
+
+
+def test_a_line_drawn_round_the_page_is_no_figure_and_makes_none_small() -> None:
+    page = np.full((600, 600, 4), 255, np.uint8)
+    rng = np.random.default_rng(4)
+    for x0, y0, x1, y1 in ((20, 20, 20, 580), (20, 580, 580, 580), (580, 590, 580, 20)):
+        ends = np.linspace((x0, y0), (x1, y1), 12) + rng.normal(0, 2, (12, 2))
+        cv2.polylines(page, [np.rint(ends).astype(np.int32)], False, (0, 0, 0, 255), 3)
+    for x in (200, 260, 320):
+        cv2.ellipse(page, (x, 400), (22, 60), 0, 0, 360, (200, 60, 40, 255), -1)
+        cv2.ellipse(page, (x, 400), (22, 60), 0, 0, 360, (0, 0, 0, 255), 2)
+    assert len(split_picture(page).views) == 3

@@ -130,3 +130,25 @@ def test_the_chance_of_a_cut_is_one_if_it_has_no_rival() -> None:
     assert 0 < sure <= 1
     assert best_option([best], cut_costs.drawn > 0.5) == (best, 1)
     assert all(best.badness <= option.badness for option in options)
+
+
+def test_a_broad_figure_is_not_cut_where_another_has_its_outline() -> None:
+    def broad(picture: np.ndarray, x: int, split: bool) -> None:
+        """Draw a figure with spread legs; a groove runs down the middle of one of them."""
+        for side in (-1, 1):
+            corners = np.array([(8, 20), (60, 30), (70, 100), (60, 172), (24, 172), (4, 110)])
+            cv2.fillPoly(picture, [corners * (side, 1) + (x, 0)], BLUE)
+        cv2.rectangle(picture, (x - 10, 30), (x + 10, 60), BLUE, -1)
+        if split:
+            cv2.line(picture, (x, 25), (x, 65), (0, 0, 0), 1)
+        else:
+            cv2.rectangle(picture, (x - 12, 24), (x + 12, 130), RED, -1)
+
+    rgb = np.full((190, 420, 3), 255, dtype=np.uint8)
+    broad(rgb, 100, split=True)
+    boxes, _ = parted(rgb[:, :210])
+    assert len(boxes) == 2
+    broad(rgb, 300, split=False)
+    boxes, cuts = parted(rgb)
+    assert len(boxes) == 2
+    assert not any(cut.made for cut in cuts)
