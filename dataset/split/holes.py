@@ -4,6 +4,8 @@ A picture alone cannot always tell; these rules say what is assumed. A patch is 
 between arm and body) if all of this holds:
 
 - it is larger than a small share of the figure,
+- it is higher than wide, as the gaps beside hanging arms and legs are, or as large as one between
+  the legs of something broad: ribbons, cuffs, labels and eyes lie,
 - it does not lie in the figure's top: a white patch there is hair, a face or a hat,
 - nothing lies inside it (an eye has a pupil),
 - a limb divides it from the outside: neither only a line (white clothes reach up to the outline)
@@ -37,6 +39,8 @@ LINE_ART = 0.5  # of the figure without its lines: more in the background's colo
 EDGE_PX = 2.0  # of a figure on transparency: its soft edge
 INK_LUMA = 64  # of 255: darker is ink
 HEAD = 0.25  # of the figure's height from its top: no holes there
+UPRIGHT = 1.2  # times its width: a hole's height
+LYING = 0.05  # of the figure's area: unless it is as large as this
 SOFT_SHADE = 48  # levels from the background: nearer is a shade of it
 LEAST_WALL_PX = 4.0
 THIN_WALL = 0.025  # of the figure's height: no limb but a line
@@ -143,6 +147,8 @@ def open_holes(
         if stats[number, cv2.CC_STAT_AREA] < max(least_share * area, LEAST_HOLE_PX):
             continue
         if stats[number, cv2.CC_STAT_TOP] < top + HEAD * height:
+            continue
+        if not _is_upright(stats[number]) and stats[number, cv2.CC_STAT_AREA] < LYING * area:
             continue
         window = _window(stats[number], labels.shape)
         patch = labels[window] == number
@@ -293,6 +299,11 @@ def _tints(
     away = rgb.astype(np.float64) - background
     bands = [np.bincount(numbers, away[..., c].ravel(), count) / counts for c in range(3)]
     return np.abs(bands).max(axis=0)
+
+
+def _is_upright(stat: np.ndarray) -> bool:
+    """Return whether a patch is higher than wide, as gaps beside hanging limbs are."""
+    return bool(stat[cv2.CC_STAT_HEIGHT] >= UPRIGHT * stat[cv2.CC_STAT_WIDTH])
 
 
 def _window(stat: np.ndarray, shape: tuple[int, int]) -> tuple[slice, slice]:

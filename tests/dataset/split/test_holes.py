@@ -75,3 +75,13 @@ def test_cuffs_nearly_as_light_as_the_paper_lie_behind_their_line_and_the_gap_op
         cv2.rectangle(picture, corner, end, INK, 6)
         cv2.rectangle(picture, corner, end, tuple(c - 20 for c in PAPER), -1)
     assert alpha_at(picture, 150, 320) == 0
+
+
+@pytest.mark.parametrize(("wide", "high", "alpha"), [(34, 24, 255), (20, 44, 0)])
+def test_a_white_label_that_lies_is_paint_and_a_gap_beside_an_arm_is_none(
+    wide: int, high: int, alpha: int
+) -> None:
+    picture = standing(NAVY, None, line=3)
+    cv2.rectangle(picture, (100, 180), (100 + wide, 180 + high), PAPER, -1)
+    cv2.rectangle(picture, (100, 180), (100 + wide, 180 + high), INK, 3)
+    assert alpha_at(picture, 100 + wide // 2, 180 + high // 2) == alpha
