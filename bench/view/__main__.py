@@ -1,8 +1,9 @@
 """`python -m bench.view RUN...`: what a page costs, and how like `render` its pictures are.
 
 Seconds are of the processor, those of `toonset render` on the same views beside them. Every
-EVERY-th view is compared over white, as it is and with the palette's first colour changed. Pace is
-that of a figure which turns by 5 degrees a frame.
+EVERY-th view is compared over white, as it is and with the palette's first colour changed. Then
+every paint is recoloured in turn and counted is what it leaves: see `crumbs`, and `hues` for
+drawings that are shaded throughout. Pace is that of a figure which turns by 5 degrees a frame.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from playwright.sync_api import Page
 
 from bench.view.compare import chromium, psnr, shown
 from bench.view.crumbs import left_behind
+from bench.view.hues import left_hues
 from toonset.camera import Camera
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.render.recolor import recolor_run
@@ -79,7 +81,32 @@ def _pictures(page: Page, trained: TrainedField, seconds: float) -> None:
     old = trained.palette.tolist()
     changed = recolor_run(trained, [f"{hex_of(tuple(old[0]))}={hex_of(NEW)}"])
     _compare(page, changed, cameras, layer, colors=[list(NEW), *old[1:]])
-    _left(page)
+    if trained.drawings is not None and trained.drawings.ramps:
+        _left_hues(page, trained, cameras[:: 2 * EVERY])
+    else:
+        _left(page)
+
+
+def _left_hues(page: Page, trained: TrainedField, cameras: Sequence[Camera]) -> None:
+    """Print what recolouring each paint leaves of its hue."""
+    assert trained.palette is not None
+    old = trained.palette.tolist()
+    for number, rgb in enumerate(old):
+        changed = recolor_run(trained, [f"{hex_of(tuple(rgb))}={hex_of(NEW)}"])
+        colors = [list(NEW) if i == number else one for i, one in enumerate(old)]
+        found = [
+            left_hues(
+                render(trained, camera).picture(),
+                shown(page, 2 * EVERY * i, colors=colors),
+                render(changed, camera).picture(),
+            )
+            for i, camera in enumerate(cameras)
+        ]
+        judged, left, shining = (
+            sum(getattr(one, name) for one in found) for name in ("judged", "old", "shining")
+        )
+        name = hex_of(tuple(rgb))
+        print(f"  {name}: of {judged} pixels {left} keep the old hue, {shining} shine")
 
 
 def _left(page: Page) -> None:

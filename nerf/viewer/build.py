@@ -32,9 +32,10 @@ from toonset.nerf.render.turntable import FILL, drawn_on_sheet, filled_box, fram
 from toonset.nerf.render.views import render
 from toonset.nerf.run.folder import CONFIG, read_field
 from toonset.nerf.viewer.layered import page_paints
+from toonset.nerf.viewer.lossy import webp
 from toonset.nerf.viewer.page import page_html
 from toonset.nerf.viewer.ring import VIEWS, Ring, ring_through
-from toonset.nerf.viewer.scene import SMALL, Blob, camera_record, coding, webp
+from toonset.nerf.viewer.scene import SMALL, Blob, camera_record, coding
 from toonset.nerf.viewer.sights import (
     body_picture,
     body_sights,

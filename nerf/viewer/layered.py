@@ -5,6 +5,10 @@
 a and b are paints; most pixels have one, those along borders are mixtures of two (`unmix`). `light`
 makes a mixture darker or lighter and moves with its paints: shadow, grain, what enlarging does
 beside lines (`light`). `tint` is what paints do not explain: a feature without a paint of its own.
+
+Drawings that are shaded throughout have no colour that a paint's pixels are near to. There a view
+keeps its colours as they are, and its paints say how they move: each along its own ramp, by the
+equation of `toonset.palette.pixels.ramp_recolor`.
 """
 
 from __future__ import annotations
@@ -19,9 +23,10 @@ from toonset.nerf.look.blend import SOLID, DrawnView
 from toonset.nerf.look.drawings import INK_LIKE
 from toonset.nerf.look.outline import Outline
 from toonset.nerf.viewer.light import Light, light_of
-from toonset.nerf.viewer.unmix import PARTS, Unmixed, unmixed
+from toonset.nerf.viewer.lossy import rgb_of_webp, webp
+from toonset.nerf.viewer.unmix import PARTS, Unmixed, unmixed, unmixed_shaded
 from toonset.palette.palette import Shadow
-from toonset.raster import depth_inside, distance_to
+from toonset.raster import depth_inside, distance_to, from_nearest
 
 LEVELS = 15  # of alpha and ink, from nothing to all
 EXACT = 1.5 / 255  # so well do paint and ink make up a pixel, or it is a drawing's own
@@ -45,6 +50,8 @@ class Layered:
         ink: (height, width) share of the coverage that lines have, 0 to LEVELS.
         paints: of every pixel.
         light: what else makes up its colour; None: nothing.
+        color: under the ink, a WebP file, of drawings that are shaded throughout; None: it is made
+            of paints and light.
     """
 
     corner: tuple[int, int]
@@ -52,6 +59,7 @@ class Layered:
     ink: Map
     paints: Unmixed
     light: Light | None
+    color: bytes | None = None
 
 
 def page_paints(paints: Colors, pen: Outline | None) -> Colors:
@@ -60,7 +68,12 @@ def page_paints(paints: Colors, pen: Outline | None) -> Colors:
 
 
 def layered(
-    view: DrawnView, paints: Colors, pen: Outline | None, shadow: Shadow | None = None
+    view: DrawnView,
+    paints: Colors,
+    pen: Outline | None,
+    shadow: Shadow | None = None,
+    *,
+    shaded: bool = False,
 ) -> Layered | None:
     """Return a view's layers in `page_paints`; None where it shows nothing.
 
@@ -69,6 +82,7 @@ def layered(
         paints: the palette that its labels name; the next label, if any, is the lines'.
         pen: that draws the lines, its width in pixels of the view; None: there are no lines.
         shadow: that the drawings have.
+        shaded: whether they are shaded throughout.
     """
     there = view.alpha >= 0.5 / LEVELS
     if not there.any():
@@ -83,7 +97,11 @@ def layered(
     if pen is not None:
         off = np.abs(paints.astype(int) - np.array(pen.rgb)).sum(axis=1)
         like = int(off.argmin()) if off.min() < INK_LIKE else len(paints)
-    found = unmixed(color, labels, there, known[: max(len(paints), (like or 0) + 1)], like, shadow)
+    if shaded:
+        found = unmixed_shaded(color, labels, there)
+    else:
+        own_paints = known[: max(len(paints), (like or 0) + 1)]
+        found = unmixed(color, labels, there, own_paints, like, shadow)
     if pen is not None and like is not None:
         drawn = found.share(like)
         found.rename(like, len(paints), (drawn > 0) & ~_thick(drawn >= SOLID, pen.width_px))
@@ -91,10 +109,14 @@ def layered(
         lifted = found.lift(len(paints), rim & own & there)
         share = np.maximum(share, lifted)
         color, lit = _lifted(color, pen.rgb, lifted), lit & (share < MOST_INK)
-    mixture = found.colors(known.astype(np.float32))
     cover, line = (
         np.rint(np.where(there, one, 0) * LEVELS).astype(np.uint8) for one in (alpha, share)
     )
+    if shaded:  # by the colours that the page will read
+        file = webp(from_nearest(color, lit))
+        found = unmixed_shaded(rgb_of_webp(file), found.first, there)
+        return Layered(corner, cover, line, found, None, file)
+    mixture = found.colors(known.astype(np.float32))
     return Layered(corner, cover, line, found, light_of(color, mixture, lit))
 
 

@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import io
 import zlib
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from jaxtyping import UInt8
-from PIL import Image
 
 from toonset.camera import Camera
 from toonset.nerf.look.blend import DRAWN, GUESSED, MIRRORED, SOLID, DrawnView
 from toonset.nerf.viewer.layered import LEVELS, Layered
 from toonset.nerf.viewer.light import BRIGHTEST, DARKEST, LIGHTEST, MIDDLE, TINT
+from toonset.nerf.viewer.lossy import webp
 from toonset.nerf.viewer.unmix import PARTS
 
 EFFORT = 7  # 9 takes five times as long for 2 %
-QUALITY = 80  # of WebP pictures
 SMALL = {"quality": 60, "alpha_quality": 50}  # of further layers: 60 % of the bytes for 2 dB
 
 ORIGIN_STEP = 2  # pixels of a view for one of its map of what is not drawn
@@ -98,6 +96,7 @@ def layered_record(view: Layered | None, shrink: int = 1) -> dict[str, Any] | No
         "size": [width, height],
         "maps": b"".join(part.tobytes() for part in (*planes, *lists)),
         "light": None if view.light is None else webp(view.light.picture()),
+        **({} if view.color is None else {"color": view.color}),
     }
 
 
@@ -136,14 +135,3 @@ def picture_record(picture: Picture, shrink: int = 1) -> dict[str, Any] | None:
     box = [shrink * side for side in (left, top, right - left, bottom - top)]
     part = picture[top:bottom, left:right]
     return {"box": box, "picture": webp(part, **(SMALL if shrink > 1 else {}))}
-
-
-def webp(
-    picture: UInt8[np.ndarray, "height width _"], quality: int = QUALITY, alpha_quality: int = 100
-) -> bytes:
-    """Return a WebP file."""
-    file = io.BytesIO()
-    Image.fromarray(picture).save(
-        file, "WEBP", quality=quality, alpha_quality=alpha_quality, method=4
-    )
-    return file.getvalue()

@@ -105,7 +105,8 @@ def _layer(view: Rendering, layer: str) -> Record | None:
     if pen is not None:
         finer = view.camera.scale / min(one.camera.scale for one in drawings.views)
         pen = replace(pen, width_px=pen.width_px * finer)
-    found = layered(view.drawn, paints, pen, drawings.drawn_shadow)
+    shaded = bool(drawings.ramps)
+    found = layered(view.drawn, paints, pen, drawings.drawn_shadow, shaded=shaded)
     record = layered_record(found)
     if found is None or record is None:
         return None

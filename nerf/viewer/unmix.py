@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.palette.palette import Shadow
+from toonset.palette.pixels.ramp_recolor import find_shaded_mixtures
 from toonset.raster import dilate, from_nearest
 
 PARTS = 16  # of a mixture
@@ -137,6 +138,20 @@ def unmixed(
     stays.reshape(-1)[at] = _off_shade(own, cover) > FAR**2
     stays &= cv2.morphologyEx(stays.view(np.uint8), cv2.MORPH_OPEN, TWO).view(np.bool_)
     return Unmixed(first, second, part, stays)
+
+
+def unmixed_shaded(color: UInt8[np.ndarray, "height width 3"], labels: Map, there: Mask) -> Unmixed:
+    """Return the paints of every pixel of drawings that are shaded throughout.
+
+    Args:
+        color: straight.
+        labels: of paints.
+        there: where anything is.
+    """
+    found = find_shaded_mixtures(color, labels, there)
+    part = np.rint(PARTS * found.share).astype(np.uint8)
+    second = np.where(part > 0, found.second, found.first)
+    return Unmixed(found.first, second, part, np.zeros_like(there))
 
 
 def _cores(

@@ -7,10 +7,14 @@ A pixel of lightness L becomes
 in OKLab, "own" and "new" being the paint's colour before and after: order and ratios of lightness
 stay, no trace of the old hue does. Along a paint's border a pixel is a mixture t p + (1 - t) q of
 the colours p of that paint and q of what is beside it, both as they are a little farther from the
-border; it moves with t p alone.
+border; it moves with t p alone. `find_shaded_mixtures` says t for every pixel at once; the page of
+`toonset view` recolours by it.
 """
 
 from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -18,10 +22,12 @@ from jaxtyping import Bool, Float, UInt8
 
 from toonset.palette.colors import oklab_from_rgb, rgb_from_oklab
 from toonset.palette.pixels.labels import UNLABELLED
-from toonset.raster import dilate, erode, nearest
+from toonset.raster import dilate, erode, nearest, wider_than
 
 SOFT_PX = 2  # from a border to where a colour is pure
 BESIDE_PX = 2.0  # deviation of the window in which pure colours beside a border are averaged
+THIN_PX = 1  # half of a strip's width, at most, that may be a blend
+BLEND = 40.0  # levels of 255: what is nearer to a mixture is one, in whatever shade
 LEAST = 1e-3  # of a window: less of a colour is not seen there
 DARKEST = 0.02  # lightness: below, hue says nothing
 
@@ -29,6 +35,59 @@ Picture = UInt8[np.ndarray, "height width 4"]
 Map = UInt8[np.ndarray, "height width"]
 Mask = Bool[np.ndarray, "height width"]
 Colors = UInt8[np.ndarray, "colors 3"]
+
+
+@dataclass(frozen=True, eq=False)
+class ShadedMixtures:
+    """Two paints of every pixel.
+
+    Attributes:
+        first: the one that covers more.
+        second: the other one; the first where there is none.
+        share: of the second, at most 1/2.
+    """
+
+    first: Map
+    second: Map
+    share: Float[np.ndarray, "height width"]
+
+
+def find_shaded_mixtures(
+    color: UInt8[np.ndarray, "height width 3"], labels: Map, drawn: Mask
+) -> ShadedMixtures:
+    """Return which two paints every pixel is a mixture of, by its colour and those beside it.
+
+    Args:
+        color: sRGB.
+        labels: of every drawn pixel.
+        drawn: where anything is.
+    """
+    whole = color.astype(np.float32)
+    labels = _without_blends(whole, labels, drawn)
+    first, second, share = labels.copy(), labels.copy(), np.zeros(drawn.shape, np.float32)
+    kinds = np.unique(labels[drawn])
+    owns = [drawn & (labels == kind) for kind in kinds]
+    edge = drawn & (sum(dilate(own, SOFT_PX).view(np.uint8) for own in owns) > 1)
+    if not edge.any():
+        return ShadedMixtures(first, second, share)
+    here, label = whole[edge], labels[edge]
+    sides = [_beside(whole, erode(own, SOFT_PX), edge) for own in owns]
+    number, each = np.searchsorted(kinds, label), np.arange(len(label))
+    own, seen = (np.stack(part)[number, each] for part in zip(*sides, strict=True))
+    beside, part = label.copy(), np.zeros(len(label), np.float32)
+    least = np.full(len(label), np.inf, np.float32)
+    for kind, (other, there) in zip(kinds, sides, strict=True):
+        way = other - own
+        most = ((here - own) * way).sum(axis=1) / np.maximum((way**2).sum(axis=1), 1.0)
+        most = most.clip(0, 1)
+        off = ((here - own - most[:, None] * way) ** 2).sum(axis=1)
+        better = seen & there & (label != kind) & (off < least)
+        beside[better], part[better], least[better] = kind, most[better], off[better]
+    swapped = part > 0.5
+    first[edge], second[edge] = np.where(swapped, (beside, label), (label, beside))
+    share[edge] = np.minimum(part, 1 - part)
+    second[share == 0] = first[share == 0]
+    return ShadedMixtures(first, second, share)
 
 
 def recolor_shaded(picture: Picture, labels: Map, old: Colors, new: Colors) -> Picture:
@@ -48,6 +107,7 @@ def recolor_shaded(picture: Picture, labels: Map, old: Colors, new: Colors) -> P
     drawn = picture[..., 3] > 0
     whole = np.where(known, labels, labels[nearest(known)])
     color = picture[..., :3].astype(np.float32)
+    whole = _without_blends(color, whole, drawn)
     result = color.copy()
     for number in changed:
         own = (whole == number) & drawn
@@ -61,6 +121,34 @@ def recolor_shaded(picture: Picture, labels: Map, old: Colors, new: Colors) -> P
     changed_picture = picture.copy()
     changed_picture[..., :3] = np.rint(result).clip(0, 255).astype(np.uint8)
     return changed_picture
+
+
+def _without_blends(color: Float[np.ndarray, "height width 3"], labels: Map, drawn: Mask) -> Map:
+    """Return labels without strips that are no paint: mixtures of the two on their sides.
+
+    A border's blend may lie on a third paint's ramp. It is a strip of that paint with none of its
+    pure colour near, and in colour between those beside it.
+    """
+    kinds = np.unique(labels[drawn])
+    owns = [drawn & (labels == kind) for kind in kinds]
+    strip = np.any([own & ~wider_than(own, THIN_PX) for own in owns], axis=0)
+    if len(kinds) < 3 or not strip.any():
+        return labels
+    sides = [_beside(color, erode(own, SOFT_PX), strip) for own in owns]
+    here, own = color[strip], np.searchsorted(kinds, labels[strip])
+    best, least = own.copy(), np.full(len(own), BLEND**2, np.float32)
+    for i, j in itertools.combinations(range(len(kinds)), 2):
+        (one, there), (other, beyond) = sides[i], sides[j]
+        way = other - one
+        share = ((here - one) * way).sum(axis=1) / np.maximum((way**2).sum(axis=1), 1.0)
+        share = share.clip(0, 1)
+        off = ((here - one - share[:, None] * way) ** 2).sum(axis=1)
+        better = there & beyond & (own != i) & (own != j) & (off < least)
+        best[better], least[better] = np.where(share > 0.5, j, i)[better], off[better]
+    alone = ~np.stack([there for _, there in sides])[own, np.arange(len(own))]
+    found = labels.copy()
+    found[strip] = np.where(alone, kinds[best], labels[strip])
+    return found
 
 
 def _turned(

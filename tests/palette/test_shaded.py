@@ -17,6 +17,7 @@ from toonset.palette.paints.select import PaletteRule
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.patches import Patches, find_patches, smooth_lab
 from toonset.palette.pixels.ramp_labels import Ramp, savings
+from toonset.palette.pixels.ramp_recolor import find_shaded_mixtures, recolor_shaded
 from toonset.palette.recolor import recolor_drawing
 from toonset.palette.shaded import find_shaded_palette, is_shaded, ramps_of
 from toonset.raster import erode
@@ -178,6 +179,40 @@ def test_a_look_of_shaded_drawings_keeps_no_old_hue() -> None:
         assert (after[own, 0] > after[own, 2]).all()
         assert np.corrcoef(light[0], light[1])[0, 1] > 0.99
         assert np.array_equal(after[erode(paint == 0, 3)], before[erode(paint == 0, 3)])
+
+
+def test_a_blend_on_a_third_paints_ramp_does_not_shine() -> None:
+    rows, columns = np.mgrid[:80, :80]
+    light = (0.8 + 0.2 * np.sin(rows / 9))[..., None]
+    blue, tan, grey = np.array([(40, 110, 190), (200, 150, 90), (120, 130, 140)], np.uint8)
+    rgb = np.where((columns < 40)[..., None], blue, tan).astype(float)
+    rgb[:, 40] = (blue.astype(float) + tan) / 2
+    rgb[60:, :20] = grey
+    picture = np.dstack([np.rint(rgb * light), np.full((80, 80), 255)]).astype(np.uint8)
+    labels = np.where(columns < 40, 0, 1).astype(np.uint8)
+    labels[:, 40] = labels[60:, :20] = 2  # the border's blend is nearest to grey
+    old = np.stack([blue, tan, grey])
+    new = old.copy()
+    new[2] = (250, 230, 40)
+    turned = recolor_shaded(picture, labels, old, new)
+    assert np.array_equal(turned[:50], picture[:50])
+    assert (turned[64:, :16, 2] < 90).all()
+    new = old.copy()
+    new[0] = (190, 60, 40)
+    blends = recolor_shaded(picture, labels, old, new)[:50, 40, :3].astype(int)
+    wanted = light[:50, 40] * (new[0].astype(float) + tan) / 2
+    assert np.abs(blends - wanted).max() < 12
+
+
+def test_mixtures_of_shaded_paints_are_what_borders_are_made_of() -> None:
+    pictures, truth, _ = _found()
+    labels = truth[0].astype(np.uint8)
+    found = find_shaded_mixtures(pictures[0][..., :3], labels, labels < 255)
+    inner = erode(labels == 2, 3)
+    assert (found.share[inner] == 0).all()
+    assert (found.first[inner] == 2).all()
+    assert (found.share <= 0.5).all()
+    assert ((found.share > 0) == (found.first != found.second)).all()
 
 
 def test_a_look_labels_shaded_drawings_as_their_palette_does() -> None:

@@ -1,5 +1,7 @@
 // One view of the drawn look in any colours, of the layers that nerf/viewer/layered.py made of it.
 
+import { createTurn } from "./ramps.js";
+
 /** @typedef {import("./types.js").LayeredRecord} LayeredRecord */
 /** @typedef {import("./types.js").Coding} Coding */
 
@@ -16,14 +18,14 @@ const LUMA = [0.299, 0.587, 0.114]; // Source: ITU-R BT.601
 /**
  * @param {LayeredRecord} record
  * @param {Uint8Array} maps of it, see `layered_record` in nerf/viewer/scene.py
- * @param {Uint8ClampedArray | null} light pixels that say how colours differ from their paints
+ * @param {Uint8ClampedArray | null} files pixels: the colours, or how they differ from their paints
  * @param {Colors} colors
  * @param {Coding} coding
  * @returns {ImageData} straight alpha
  */
-export function composed({ size: [width, height] }, maps, light, colors, coding) {
+export function composed({ size: [width, height], color }, maps, files, colors, coding) {
   const { levels, parts, middle, darkest, lightest, brightest, tint } = coding;
-  const turn = middle + (brightest - 1) * (middle - darkest); // the level of the largest gain
+  const most = middle + (brightest - 1) * (middle - darkest); // the level of the largest gain
   const count = width * height;
   const flags = maps.subarray(count, 2 * count);
   const many = [SOFT, LINED, MIXED].map((flag) => flags.reduce((n, f) => n + (f & flag ? 1 : 0), 0));
@@ -33,6 +35,9 @@ export function composed({ size: [width, height] }, maps, light, colors, coding)
   const picture = new ImageData(width, height);
   const { data } = picture;
   const off = [0, 0, 0]; // of the tint
+  const light = color ? null : files;
+  const turn = color && files ? createTurn(files, width, maps, flags, colors) : null;
+  const turned = [0, 0, 0];
   for (let i = 0; i < count; i++) {
     const flag = flags[i];
     if (!flag) continue;
@@ -47,17 +52,19 @@ export function composed({ size: [width, height] }, maps, light, colors, coding)
       const [red, green, blue] = [light[4 * i], light[4 * i + 1], light[4 * i + 2]];
       const level = LUMA[0] * red + LUMA[1] * green + LUMA[2] * blue;
       gain = Math.max(0, Math.min(brightest, 1 + (level - middle) / (middle - darkest)));
-      glow = Math.max(0, Math.min(1, (level - turn) / (lightest - turn)));
+      glow = Math.max(0, Math.min(1, (level - most) / (lightest - most)));
       off[0] = tint * (red - level);
       off[1] = tint * (green - level);
       off[2] = tint * (blue - level);
     }
+    turn?.(i, maps[i], b / 3, part, turned);
     for (let c = 0; c < 3; c++) {
       const before = old[a + c] + part * (old[b + c] - old[a + c]);
       const after = now[a + c] + part * (now[b + c] - now[a + c]);
       let value = flag & STAYS ? before : after;
       value = Math.min(1, gain) * value + Math.max(0, gain - 1) * before; // as much brighter as it was
       value += glow * (255 - value) + off[c];
+      if (turn) value = turned[c];
       value = Math.min(255, Math.max(0, value));
       if (colors.ink) value += covered * (colors.ink[c] - value);
       data[4 * i + c] = value;

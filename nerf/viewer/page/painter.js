@@ -39,10 +39,13 @@ export function createPainter(canvas, scene, blob, ask) {
     /** @type {Loaded} */
     const found = record.picture
       ? { picture: await pictureAt(blob, record.picture) }
-      : { light: record.light ? pixelsOf(await pictureAt(blob, record.light)) : null };
+      : { light: await pixelsAt(record.color ?? record.light) };
     loaded.set(record, found);
     return found;
   }
+
+  /** @param {import("./types.js").Range | null} range @returns {Promise<Uint8ClampedArray | null>} */
+  const pixelsAt = async (range) => range && pixelsOf(await pictureAt(blob, range));
 
   /** @param {LayerRecord} record @param {Loaded} files @param {Shot} shot @returns {CanvasImageSource} */
   function pictureOf(record, files, { colors, pen, lines }) {

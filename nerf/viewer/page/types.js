@@ -22,12 +22,13 @@
  * @property {number[]} size width and height of the layers
  * @property {Range} maps
  * @property {Range | null} light a WebP picture of how colours differ from their paints
+ * @property {Range} [color] a WebP picture of the colours themselves, of drawings that are shaded throughout
  * @property {{size: number[], mirrored: number, guessed: number, map: Range} | null} [origins] what no
  *   drawing shows: a byte per pixel (0 drawn, 1 mirrored, 2 guessed) over the box; and their shares
  * @property {undefined} [picture]
  */
 
-/** @typedef {{box: number[], picture: Range, maps?: any, light?: any, size?: any}} PictureRecord a WebP picture */
+/** @typedef {{box: number[], picture: Range, maps?: any, light?: any, color?: any, size?: any}} PictureRecord a WebP picture */
 
 /** @typedef {any} LayerRecord a `LayeredRecord` or a `PictureRecord` */
 

@@ -17,6 +17,7 @@ from toonset.camera import Camera
 from toonset.nerf.look.blend import DRAWN, GUESSED, MIRRORED, DrawnView
 from toonset.nerf.look.outline import Outline
 from toonset.nerf.viewer.layered import layered
+from toonset.nerf.viewer.lossy import webp
 from toonset.nerf.viewer.page import page_html
 from toonset.nerf.viewer.scene import (
     Blob,
@@ -25,7 +26,6 @@ from toonset.nerf.viewer.scene import (
     layered_record,
     origins_record,
     picture_record,
-    webp,
 )
 
 SIZE_WH = (60, 90)
