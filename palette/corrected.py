@@ -23,6 +23,7 @@ from toonset.palette.extract import IN_LIGHT, LINE, PaintMap, in_light, maps_in_
 from toonset.palette.names import RGB, hex_of, rgb_of_hex
 from toonset.palette.palette import ContourColor, Palette, PaletteColor, Tone
 from toonset.palette.pixels.antialias import OPAQUE
+from toonset.palette.pixels.cel_tones import MOST_TONES, step_tones
 from toonset.palette.pixels.labels import UNLABELLED, Space, nearest_colors
 from toonset.palette.pixels.ramp_labels import Ramp
 from toonset.palette.pixels.shadow import apply_shadow
@@ -125,8 +126,12 @@ def correct_palette(
         contour=ink,
         features=tuple(rgb for rgb in found.features if rgb in plan.final),
     )
-    pairs = zip(maps, labels, strict=True)
-    return palette, [_with_tones(before, anew[own]) for before, own in pairs]
+    labels = [anew[own] for own in labels]
+    if palette.stepped:
+        pairs = zip(lit, labels, strict=True)
+        return palette, [PaintMap(own, step_tones(light, own, palette)) for light, own in pairs]
+    parts = zip(maps, labels, strict=True)
+    return palette, [_with_tones(before, own) for before, own in parts]
 
 
 def _plan(found: Palette, wanted: PaletteCorrections, where: str) -> _Plan:
@@ -189,7 +194,7 @@ def _ramps(found: Palette, plan: _Plan) -> list[Ramp]:
 
     That of a colour which was more before may be of all that; it is the ray through black.
     """
-    if not found.has_ramps:
+    if not found.has_ramps or found.stepped:
         return []
     own = {o: ramp_of(one) for o, one in zip(plan.old, found.colors, strict=True)}
     whole = {rgb for rgb, targets in zip(plan.old, plan.becomes, strict=True) if targets == (rgb,)}
@@ -271,8 +276,19 @@ def _colors(
             red, green, blue = dark_rgb.tolist()
             both = Tone(rgb, share - in_shadow), Tone((red, green, blue), in_shadow)
             tones = both if in_shadow > 0 else both[:1]
+        if found.stepped:
+            tones = _united_tones(found, plan, rgb, share)
         colors.append(PaletteColor(rgb, share, name, tones, factor=factor))
     return colors
+
+
+def _united_tones(found: Palette, plan: _Plan, rgb: RGB, share: float) -> tuple[Tone, ...]:
+    """Return the tones of all that a colour is made of, from light to dark; it is the lightest."""
+    parts = zip(found.colors, plan.becomes, strict=True)
+    tones = [tone for color, targets in parts if targets == (rgb,) for tone in color.tones]
+    tones = [tone for tone in tones if tone.rgb != rgb and sum(tone.rgb) < sum(rgb)]
+    tones = sorted(tones, key=lambda tone: -sum(tone.rgb))[: MOST_TONES - 1]
+    return (Tone(rgb, share - sum(tone.share for tone in tones)), *tones)
 
 
 def _ink(found: Palette, plan: _Plan) -> tuple[ContourColor | None, bool]:

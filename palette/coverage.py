@@ -9,12 +9,12 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import UInt8
 
-from toonset.palette.extract import IN_SHADOW, PaintMap
+from toonset.palette.extract import PaintMap
 from toonset.palette.palette import Palette
+from toonset.palette.pixels.cel_tones import tone_colors
 from toonset.palette.pixels.labels import UNLABELLED
 from toonset.palette.pixels.mixtures import LINE, NONE, colors_as_drawn, find_mixtures
-from toonset.palette.pixels.own_shadows import factors_of
-from toonset.palette.pixels.recolor import tone_map, tones_of
+from toonset.palette.pixels.recolor import tone_map
 from toonset.raster import is_uniform
 
 Map = UInt8[np.ndarray, "height width"]
@@ -36,14 +36,14 @@ def coverage_map(
         palette: of the sheet.
     """
     count = len(palette.colors)
-    dark = None if paint.tones is None else paint.tones == IN_SHADOW
-    tones = tone_map(paint.labels, dark, contour, count)
+    colors = tone_colors(palette, palette.rgb)
+    tones = tone_map(paint.labels, paint.tones, contour, count, len(colors) // count)
     inside = is_uniform(tones)
-    drawn = colors_as_drawn(picture, tones, inside, tones_of(palette.rgb, factors_of(palette)))
+    drawn = colors_as_drawn(picture, tones, inside, colors)
     pure = (tones != NONE) & inside & (contour < LINE)
     mixed = (picture[..., 3] > 0) & ~pure
     found = find_mixtures(picture, tones, inside, contour, drawn, mixed)
-    paints = np.append(np.arange(2 * count) % count, _paint_of_lines(palette)).astype(np.uint8)
+    paints = np.append(np.arange(len(colors)) % count, _paint_of_lines(palette)).astype(np.uint8)
     first, second = paints[found.first], paints[found.second]
     share = np.where(first == second, 1, 1 - found.part)
     swapped = (second != UNLABELLED) & ((first == UNLABELLED) | (share < 0.5))

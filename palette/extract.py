@@ -18,13 +18,14 @@ from toonset.palette.formats.registry import (
 )
 from toonset.palette.named import with_names
 from toonset.palette.names import RGB
-from toonset.palette.options import PaletteOptions
+from toonset.palette.options import MAX_COLORS, PaletteOptions
 from toonset.palette.paints.extract import PICKED, find_palette, pick_palette
 from toonset.palette.paints.features import find_features
 from toonset.palette.paints.grainy_colors import read_drawn_colors
 from toonset.palette.paints.places import add_places
 from toonset.palette.paints.select import PaletteRule
 from toonset.palette.palette import Palette, PaletteColor, Shadow, Tone
+from toonset.palette.pixels.cel_tones import find_steps, step_labels, step_tones, with_steps
 from toonset.palette.pixels.enlarged import common_grids
 from toonset.palette.pixels.grain import LEAST_LEVELS, noise_levels, remove_grain
 from toonset.palette.pixels.ink_lines import find_contours
@@ -50,6 +51,7 @@ Mask = Bool[np.ndarray, "height width"]
 
 LINE = 128  # of 255: covered by half, a pixel is a drawn line's
 NEVER_IN_LIGHT = 0.95  # of a paint's pixels lie in shadow
+LEAST_STEP = 0.008  # of the character: smaller tones are not told from blends
 IN_LIGHT, IN_SHADOW = 0, 1  # tones; UNLABELLED where there is no paint
 
 
@@ -59,8 +61,8 @@ class PaintMap:
 
     Attributes:
         labels: palette index; 255 = background, blend, or a drawn line whose colour is no paint's.
-        tones: 0 = in light, 1 = in shadow, 255 where there is no label; None: the sheet has no
-            shadow. Drawn lines lie in light.
+        tones: 0 = in light, 1 = in shadow, up to 3 for darker steps, 255 where there is no label;
+            None: the sheet has no shadow. Drawn lines lie in light.
     """
 
     labels: Map
@@ -218,6 +220,10 @@ def _chosen(
         palette = pick_palette(lit, picked, lines)
     else:
         palette = _of_sheet(lit, options, lines, shadow, printed)
+        drawn = palette if shadow is None else find_palette(smooth, options, lines)
+        steps = _stepped(drawn, smooth, contours, options, 2 if shadow is None else 3)
+        if steps is not None:
+            return steps
         invented = None if shadow is None else _never_in_light(lit, dark, palette)
         if shadow is not None and invented is not None:
             dark = [shade & ~off for shade, off in zip(dark, invented, strict=True)]
@@ -233,6 +239,44 @@ def _chosen(
     if palette.evidence is None:  # the colours were picked
         return palette
     return with_own_shadows(palette, lit, paint, contours, options.keep)
+
+
+def _stepped(
+    found: Palette,
+    pictures: Sequence[Picture],
+    contours: Sequence[Map],
+    options: PaletteRule,
+    least: int,
+) -> Palette | None:
+    """Return the palette of drawings that are shaded in steps; None of others.
+
+    Args:
+        found: their palette as they are drawn, each tone a colour.
+        pictures: the drawings.
+        contours: how far lines cover their pixels.
+        options: of the choice.
+        least: tones that some paint must have.
+    """
+    known = {one.rgb: one.share for one in found.dropped}
+    known |= {one.rgb: one.share for one in found.colors}
+    colors = [rgb for rgb, share in known.items() if share >= LEAST_STEP]
+    steps = find_steps(pictures, contours, np.array(colors, np.uint8))
+    if max(map(len, steps), default=0) < least:
+        return None
+    paints = [[colors[n] for n in tones] for tones in steps]
+    paints = [[rgb for rgb in tones if rgb not in options.keep] for tones in paints]
+    paints = [tones for tones in paints if sum(map(known.__getitem__, tones)) >= options.min_share]
+    tones = tuple(rgb for own in paints for rgb in own)
+    wider = replace(
+        options,
+        keep=(*options.keep, *tones),
+        max_colors=min(MAX_COLORS, options.max_colors + len(tones) - len(paints)),
+    )
+    lines = [contour >= LINE for contour in contours]
+    return replace(
+        with_steps(_in_light(pictures, wider, lines), paints, options.min_share, options.keep),
+        rule=found.rule,
+    )
 
 
 def _of_sheet(
@@ -350,6 +394,14 @@ def maps_in_light(
     space: Space = "rgb",
 ) -> list[PaintMap]:
     """Return labels and tones of what `in_light` returns."""
+    if palette.stepped:
+        drawn = list(zip(pictures, contours, strict=True))
+        maps = [step_labels(picture, contour, palette, space) for picture, contour in drawn]
+        _take_out_lines(maps, contours, palette)
+        return [
+            PaintMap(labels, step_tones(picture, labels, palette))
+            for picture, labels in zip(pictures, maps, strict=True)
+        ]
     ramps = ramps_of(palette)
     if ramps:
         return [PaintMap(labels, None) for labels in shaded_labels(pictures, ramps)]
@@ -358,16 +410,21 @@ def maps_in_light(
         maps, dark = [labels for labels, _ in both], [shade for _, shade in both]
     else:
         maps = [label_pixels(picture, palette.rgb, space=space) for picture in pictures]
-    ink = palette.contour
-    if ink is not None and ink.rgb not in [color.rgb for color in palette.colors]:
-        for labels, contour in zip(maps, contours, strict=True):
-            labels[contour >= LINE] = UNLABELLED
+    _take_out_lines(maps, contours, palette)
     if dark is None:
         return [PaintMap(labels, None) for labels in maps]
     return [
         PaintMap(labels, _tone_map(labels, shade & (contour < LINE)))
         for labels, shade, contour in zip(maps, dark, contours, strict=True)
     ]
+
+
+def _take_out_lines(maps: Sequence[Map], contours: Sequence[Map], palette: Palette) -> None:
+    """Take labels off drawn lines whose colour is no paint's."""
+    ink = palette.contour
+    if ink is not None and ink.rgb not in [color.rgb for color in palette.colors]:
+        for labels, contour in zip(maps, contours, strict=True):
+            labels[contour >= LINE] = UNLABELLED
 
 
 def _tone_map(labels: Map, dark: Mask) -> Map:

@@ -64,7 +64,7 @@ class PaletteColor:
         share: of the character's pixels over all pictures, 0 to 1; all tones together.
         name: a plain name for people.
         tones: in light and in shadow, where the sheet has a shadow; where it has none, but is
-            shaded throughout, the paint's ramp from light to dark.
+            shaded in steps, one to four from light to dark, or throughout, the paint's ramp.
         sure: of a ramp, how likely its pixels are this paint, the mean; None: nobody asked.
         factor: of levels of sRGB in shadow, red, green and blue, where the paint has its own; None:
             the sheet's.
@@ -175,6 +175,7 @@ class Palette:
         features: those of the colours that are under the rule, but kept: eyes, mouths, buttons.
         printed: colours that the sheet itself prints as its palette, in that order.
         title: what programs show as the palette's name; "": none was given yet.
+        stepped: paints are shaded in flat steps: their tones are those, not stops of ramps.
     """
 
     colors: Annotated[tuple[PaletteColor, ...], Field(min_length=1, max_length=MAX_COLORS)]
@@ -187,6 +188,7 @@ class Palette:
     features: tuple[Hex, ...] = ()
     printed: tuple[Hex, ...] = ()
     title: Name = ""
+    stepped: bool = False
 
     def __post_init__(self) -> None:
         """Refuse palettes that cannot label anything.
@@ -199,8 +201,13 @@ class Palette:
 
     @property
     def has_ramps(self) -> bool:
-        """Return whether the sheet is shaded throughout: its paints' tones are ramps."""
+        """Return whether paints are recoloured along ramps: painted ones, or steps in light."""
         return self.shadow is None and any(color.tones for color in self.colors)
+
+    @property
+    def has_tones(self) -> bool:
+        """Return whether every pixel of a paint has one of few tones."""
+        return self.stepped or self.shadow is not None
 
     @property
     def rgb(self) -> UInt8[np.ndarray, "colors 3"]:

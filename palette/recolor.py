@@ -9,13 +9,13 @@ from jaxtyping import UInt8
 
 from toonset.errors import PaletteError
 from toonset.palette.color_names import meant_by, name_of
-from toonset.palette.extract import IN_SHADOW, PaintMap
+from toonset.palette.extract import PaintMap
 from toonset.palette.formats.hex import is_color, rgb_of_typed
 from toonset.palette.names import RGB, hex_of
 from toonset.palette.palette import Palette
-from toonset.palette.pixels.own_shadows import factors_of
+from toonset.palette.pixels.cel_tones import tone_colors
 from toonset.palette.pixels.ramp_recolor import recolor_shaded
-from toonset.palette.pixels.recolor import recolor, tone_map, tones_of
+from toonset.palette.pixels.recolor import recolor, tone_map
 
 Picture = UInt8[np.ndarray, "height width 4"]
 Map = UInt8[np.ndarray, "height width"]
@@ -82,10 +82,8 @@ def recolor_drawing(
         palette: of the sheet.
         colors: as many as it has, in its order.
     """
-    if palette.has_ramps:
+    if palette.has_ramps and not palette.stepped:
         return recolor_shaded(picture, paint.labels, palette.rgb, colors)
-    dark = None if paint.tones is None else paint.tones == IN_SHADOW
-    tones = tone_map(paint.labels, dark, contour, len(colors))
-    factors = factors_of(palette)
-    old, new = (tones_of(one, factors) for one in (palette.rgb, colors))
+    old, new = (tone_colors(palette, one) for one in (palette.rgb, colors))
+    tones = tone_map(paint.labels, paint.tones, contour, len(colors), len(old) // len(colors))
     return recolor(picture, tones, contour, old, new)

@@ -34,18 +34,19 @@ def _color_line(color: PaletteColor, found: Palette) -> str:
     """Return a colour's line, with how much of it lies in shadow, and whether it is a feature."""
     notes = [f"{HUNDRED * dark.share:.1f} % in shadow" for dark in color.tones[1:]]
     if found.has_ramps:
-        notes = _ramp_notes(color)
+        notes = _ramp_notes(color, stepped=found.stepped)
     notes += ["feature"] if color.rgb in found.features else []
     return _line(color.rgb, color.share, color.name) + (f" ({', '.join(notes)})" if notes else "")
 
 
-def _ramp_notes(color: PaletteColor) -> list[str]:
+def _ramp_notes(color: PaletteColor, *, stepped: bool) -> list[str]:
     """Return a ramp's ends, and how sure its labels are if they are not."""
     from toonset.palette.names import hex_of
 
     notes = []
-    if color.tones:
-        notes.append(f"from {hex_of(color.tones[0].rgb)} to {hex_of(color.tones[-1].rgb)}")
+    if len(color.tones) > 1:
+        steps = f"{len(color.tones)} tones " if stepped else ""
+        notes.append(f"{steps}from {hex_of(color.tones[0].rgb)} to {hex_of(color.tones[-1].rgb)}")
     if color.sure is not None and color.sure < LEAST_SURE:
         notes.append(f"{HUNDRED * color.sure:.0f} % sure")
     return notes

@@ -127,7 +127,7 @@ def _check_colors(log: ProblemLog, file: Path, frames: _Frames) -> None:
         log.attempt(file.name, check_label_names, file, frames.posed)
     count = len(palette.colors)
     _check_maps(log, LABELS, frames, lambda frame: read_labels(log.root, frame, count))
-    if palette.shadow is not None:
+    if palette.has_tones:
         _check_maps(log, TONES, frames, lambda frame: read_tones(log.root, frame))
     elif (log.root / TONES).exists():
         log.add(TONES, "is there but palette.json has no shadow; run `toonset palette` again")

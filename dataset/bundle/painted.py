@@ -60,9 +60,9 @@ def read_painted(path: Path) -> tuple[Palette, list[Painted]]:
         picture = read_picture(frame, file)
         labels = read_labels(root, frame, len(palette.colors))
         contour = read_contour(root, frame)
-        tones = None if palette.shadow is None else read_tones(root, frame)
+        tones = read_tones(root, frame) if palette.has_tones else None
         parts = {"labels": labels, "contours": contour}
-        if palette.shadow is not None:
+        if palette.has_tones:
             parts["tones"] = tones
         for folder, values in parts.items():
             if values is None:

@@ -24,9 +24,9 @@ from toonset.dataset.mesh.load import load_mesh
 from toonset.errors import BundleError
 from toonset.lock import settle
 from toonset.options import SYMMETRIC, Symmetric
-from toonset.palette.extract import IN_LIGHT, IN_SHADOW
 from toonset.palette.formats.json import read_palette_json
 from toonset.palette.palette import Palette
+from toonset.palette.pixels.cel_tones import MOST_TONES
 from toonset.palette.pixels.labels import UNLABELLED
 from toonset.palette.shaded import ramps_of
 
@@ -125,7 +125,7 @@ def read_labels(root: Path, frame: PosedPicture, colors: int) -> Labels | None:
 
 
 def read_tones(root: Path, frame: PosedPicture) -> UInt8[np.ndarray, "height width"] | None:
-    """Return whether each pixel's paint lies in light (0) or in shadow (1); 255: no paint.
+    """Return how dark each pixel's paint lies: 0 in light, 1 in shadow, to 3; 255: no paint.
 
     None where the frame has no tones: those of a flat sheet, or of an older palette.
 
@@ -137,11 +137,11 @@ def read_tones(root: Path, frame: PosedPicture) -> UInt8[np.ndarray, "height wid
     if file is None:
         return None
     tones = _read_grey(file, frame)
-    odd = tones[~np.isin(tones, (IN_LIGHT, IN_SHADOW, UNLABELLED))]
+    odd = tones[~np.isin(tones, (*range(MOST_TONES), UNLABELLED))]
     if odd.size:
         raise BundleError(
-            f"{file}: has the value {odd[0]}, only 0 (light), 1 (shadow) and 255 (none) are known; "
-            "write the tones again with `toonset palette`"
+            f"{file}: has the value {odd[0]}, only 0 (light) to 3 (darkest) and 255 (none) are "
+            "known; write the tones again with `toonset palette`"
         )
     return tones
 

@@ -50,8 +50,9 @@ def json_title(data: bytes) -> str:
 def to_json(palette: Palette) -> dict[str, Any]:
     """Return the content of palette.json."""
     content: dict[str, Any] = PALETTE.dump_python(palette, mode="json", by_alias=True)
-    if not content["printed"]:
-        del content["printed"]
+    for key in ("printed", "stepped"):  # written where there are any
+        if not content[key]:
+            del content[key]
     content["colors"] = [
         {k: value for k, value in one.items() if k not in SELDOM or value is not None}
         | {"name": one_line(one["name"])}

@@ -114,8 +114,8 @@ def recolor_shaded(picture: Picture, labels: Map, old: Colors, new: Colors) -> P
         pure, other = erode(own, SOFT_PX), erode(drawn & ~own, SOFT_PX)
         edge = dilate(own, SOFT_PX) & drawn & ~pure & dilate(drawn & ~own, SOFT_PX)
         inside = own & ~edge
-        turned = _turned(picture[inside, :3], old[number], new[number])
-        result[inside] += turned.astype(np.float32) - color[inside]
+        shown = turned(picture[inside, :3], old[number], new[number])
+        result[inside] += shown.astype(np.float32) - color[inside]
         if edge.any():
             result[edge] += _mixed(color, own, (pure, other), edge, (old[number], new[number]))
     changed_picture = picture.copy()
@@ -151,7 +151,7 @@ def _without_blends(color: Float[np.ndarray, "height width 3"], labels: Map, dra
     return found
 
 
-def _turned(
+def turned(
     rgb: UInt8[np.ndarray, "n 3"], old: UInt8[np.ndarray, " 3"], new: UInt8[np.ndarray, " 3"]
 ) -> UInt8[np.ndarray, "n 3"]:
     """Return colours of a paint in its new hue: see the module's equation."""
@@ -184,8 +184,8 @@ def _mixed(
     share = ((here - outer) * way).sum(axis=1) / np.maximum((way**2).sum(axis=1), 1.0)
     share = np.where(beside & seen, share.clip(0, 1), own[edge])
     base = np.where((beside & seen)[:, None], first, here)
-    turned = _turned(np.rint(base).clip(0, 255).astype(np.uint8), *change)
-    return np.asarray(share[:, None] * (turned - base))
+    moved = turned(np.rint(base).clip(0, 255).astype(np.uint8), *change)
+    return np.asarray(share[:, None] * (moved - base))
 
 
 def _beside(

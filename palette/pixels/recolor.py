@@ -48,21 +48,26 @@ def tones_of(
 
 
 def tone_map(
-    labels: Map, dark: Bool[np.ndarray, "height width"] | None, contour: Map, colors: int
+    labels: Map,
+    tones: Map | Bool[np.ndarray, "height width"] | None,
+    contour: Map,
+    colors: int,
+    steps: int = 2,
 ) -> Tones:
     """Return which of `tones_of` every pixel has; their number: a drawn line; `NONE`.
 
     Args:
         labels: index of a colour, `UNLABELLED` for blends and the background.
-        dark: where paint lies in shadow; None: nowhere.
+        tones: how dark paint lies, from 0 on; None: in light everywhere.
         contour: how far lines cover every pixel.
         colors: of the palette.
+        steps: tones of a colour.
     """
     own: Tones = labels.astype(np.int16)
-    if dark is not None:
-        own[dark] += colors
+    if tones is not None:
+        own += np.int16(colors) * np.where(tones == UNLABELLED, 0, tones).clip(0, steps - 1)
     own[labels == UNLABELLED] = NONE
-    own[contour >= DRAWN] = 2 * colors
+    own[contour >= DRAWN] = steps * colors
     return own
 
 

@@ -74,8 +74,8 @@ def test_tones_are_checked_like_labels(place: Path):
     assert (tones == 1).all()
     Image.new("L", (20, 24), 7).save(place / "tones" / "001.png")
     assert problems(place) == [
-        "tones/001.png: has the value 7, only 0 (light), 1 (shadow) and 255 (none) are known; "
-        "write the tones again with `toonset palette`",
+        "tones/001.png: has the value 7, only 0 (light) to 3 (darkest) and 255 (none) are "
+        "known; write the tones again with `toonset palette`",
         "tones/002.png: is missing; run `toonset palette` again",
     ]
 
