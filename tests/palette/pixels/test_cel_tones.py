@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from toonset.palette.colors import oklab_from_rgb
+from toonset.palette.corrected import correct_palette
+from toonset.palette.corrections import PaletteCorrections
 from toonset.palette.extract import extract_palette, paint_maps
 from toonset.palette.formats.json import palette_of, to_json
+from toonset.palette.names import hex_of
 from toonset.palette.palette import Palette
-from toonset.palette.pixels.cel_tones import find_steps, tone_colors
+from toonset.palette.pixels.cel_tones import MOST_TONES, find_steps, tone_colors
 from toonset.palette.pixels.ink_lines import find_contours
 from toonset.palette.recolor import recolor_drawing
 from toonset.raster import erode
@@ -154,6 +157,22 @@ def test_recolouring_turns_all_tones_and_keeps_their_order_and_contrast() -> Non
     assert after[:, 0] == pytest.approx(ratio * before[:, 0], rel=0.03)
     others = erode((paints[0] < 255) & (paints[0] != 1), 3)
     assert np.array_equal(turned[others], pictures[0][others])
+
+
+def test_merged_paints_have_tones_that_their_maps_name() -> None:
+    palette, _ = _palette(3)
+    pictures, lines = _drawn(3)[0], find_contours(_drawn(3)[0])
+    first, second = (hex_of(color.rgb) for color in palette.colors[:2])
+    wanted = PaletteCorrections(merge=((first, second),))
+    found, maps = correct_palette(pictures, lines, palette, wanted)
+    assert len(found.colors) == len(palette.colors) - 1
+    for number, color in enumerate(found.colors):
+        assert 1 <= len(color.tones) <= MOST_TONES
+        assert sum(tone.share for tone in color.tones) == pytest.approx(color.share)
+        for one in maps:
+            assert one.tones is not None
+            own = one.tones[one.labels == number]
+            assert own.max(initial=0) < len(color.tones)
 
 
 def test_all_paints_have_as_many_tones_in_tables() -> None:
