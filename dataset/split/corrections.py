@@ -225,9 +225,11 @@ def _outlines(
 
 
 def remove_construction_lines(state: SheetState) -> SheetState | None:
-    """Propose figures without the ends of construction lines that stick out of them."""
+    """Propose line drawings without the ends of construction lines that stick out of them."""
+    if not len(state.main_blobs) or _are_painted(state):
+        return None
     lines = find_construction_lines(state.blobs, state.main_blobs)
-    return replace(state, ruled=state.ruled | lines).with_paper() if lines.any() else None
+    return state.without_lines(lines) if lines.any() else None
 
 
 def cut_touching_figures(state: SheetState) -> SheetState | None:
@@ -244,9 +246,10 @@ def add_blocky_figures(state: SheetState) -> SheetState | None:
 
 
 def drop_strangers(state: SheetState) -> SheetState | None:
-    """Propose smaller figures in other colours as no views, and a painted one among line drawings.
+    """Propose fewer views: no smaller figures in other colours, no illustration.
 
-    So a sword is none, nor is an illustration in another pose beside a turnaround.
+    The first are swords as high as their bearers; an illustration is painted, in another pose,
+    beside a turnaround in lines.
     """
     main_blobs = remove_strangers(state.blobs, state.main_blobs, state.painted, state.rgba[..., :3])
     main_blobs = main_blobs[~_painted_alone(state, main_blobs)]
@@ -256,12 +259,12 @@ def drop_strangers(state: SheetState) -> SheetState | None:
 def _painted_alone(
     state: SheetState, numbers: Int[np.ndarray, " bodies"]
 ) -> Bool[np.ndarray, " bodies"]:
-    """Return which figure is painted among line drawings, in a pose that none of them has.
+    """Find the one figure that is painted among line drawings, in a pose that none of them has.
 
-    Where one has it, a drawing of a turnaround is coloured.
+    If one of them has the same pose, it is a view of the turnaround that is coloured.
     """
     nothing = np.zeros(len(numbers), dtype=bool)
-    if len(numbers) < LEAST_ROW:
+    if len(numbers) <= LEAST_ROW:  # a painted front beside two views in lines is a view
         return nothing
     masks = [state.blobs.mask(int(number)) for number in numbers]
     windows = [state.rgba[state.blobs.window(int(number))][..., :3] for number in numbers]

@@ -4,8 +4,8 @@ A picture alone cannot always tell; these rules say what is assumed. A patch is 
 between arm and body) if all of this holds:
 
 - it is larger than a small share of the figure,
-- it is higher than wide, as the gaps beside hanging arms and legs are, or as large as one between
-  the legs of something broad: ribbons, cuffs, labels and eyes lie,
+- it is as high as wide or higher, as gaps beside arms and legs are, or as large as one between the
+  legs of something broad: ribbons, cuffs, labels and eyes are wider than high,
 - it does not lie in the figure's top: a white patch there is hair, a face or a hat,
 - nothing lies inside it (an eye has a pupil),
 - a limb divides it from the outside: neither only a line (white clothes reach up to the outline)
@@ -39,7 +39,7 @@ LINE_ART = 0.5  # of the figure without its lines: more in the background's colo
 EDGE_PX = 2.0  # of a figure on transparency: its soft edge
 INK_LUMA = 64  # of 255: darker is ink
 HEAD = 0.25  # of the figure's height from its top: no holes there
-UPRIGHT = 1.2  # times its width: a hole's height
+UPRIGHT = 0.9  # times its width: a hole's height
 LYING = 0.05  # of the figure's area: unless it is as large as this
 SOFT_SHADE = 48  # levels from the background: nearer is a shade of it
 LEAST_WALL_PX = 4.0
@@ -302,7 +302,7 @@ def _tints(
 
 
 def _is_upright(stat: np.ndarray) -> bool:
-    """Return whether a patch is higher than wide, as gaps beside hanging limbs are."""
+    """Return whether a patch is as high as wide or higher, as gaps beside limbs are."""
     return bool(stat[cv2.CC_STAT_HEIGHT] >= UPRIGHT * stat[cv2.CC_STAT_WIDTH])
 
 

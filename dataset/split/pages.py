@@ -274,11 +274,9 @@ def _panel(
     straight = min(share for _, share in sides) >= STRAIGHT
     if not straight or inside.sum() < LEAST_PANEL * own.size or own[inside].mean() < FULL:
         return None
-    cells = _with_edge(own, inside, edge)
-    mask = cv2.resize(cells.view(np.uint8), size_wh, interpolation=cv2.INTER_NEAREST) > 0
     paper = _paper_of(rgba, rgb, labels, inside)
     if paper is None:
-        return _panel_of_pattern(rgba, mask, np.median(rgb[ground], axis=0))
+        return None
     if np.abs(np.median(rgb[ground], axis=0) - paper.rgb).max() < APART:
         return None
     shown = paper.colors((0, 0, *size_wh))
@@ -288,44 +286,10 @@ def _panel(
         return None
     if _is_flat(rgba):
         return None
-    return Pages(mask, np.dstack([shown, np.full_like(shown[..., :1], 255)]), 1, True, paper)
-
-
-def _with_edge(
-    own: Bool[np.ndarray, "rows columns"], inside: Bool[np.ndarray, "rows columns"], edge: int
-) -> Bool[np.ndarray, "rows columns"]:
-    """Return a panel's inside with what stands over its edge."""
     beyond = dilate(own, CELLS) & ~dilate(inside, edge + CELLS)
-    return inside | (dilate(beyond, edge + CELLS) & own)
-
-
-def _panel_of_pattern(
-    rgba: UInt8[np.ndarray, "height width 4"],
-    mask: Bool[np.ndarray, "height width"],
-    ground: Float[np.ndarray, " 3"],
-) -> Pages | None:
-    """Return a panel whose ground is no smooth paper but clear to tell: a pattern, a glow.
-
-    Args:
-        rgba: the picture.
-        mask: the panel.
-        ground: colour of what lies around it.
-    """
-    x, y, width, height = cv2.boundingRect(mask.view(np.uint8))
-    panel = np.ascontiguousarray(rgba[y : y + height, x : x + width])
-    try:
-        found = find_background(panel)
-    except SheetError:
-        return None
-    if found.rgb is None:
-        return None
-    paper = found.colors((0, 0, width, height))
-    as_around = np.abs(paper - ground).max(axis=-1) < APART
-    if as_around.mean() >= LEAST_ZONE:
-        return None
-    drawn = difference(panel[..., :3], paper) > found.tolerance
-    tall = _heights(drawn, np.zeros_like(drawn)).max(initial=0)
-    return Pages(mask, from_nearest(rgba, mask), 1, True) if tall >= FRAMED * height else None
+    cells = inside | (dilate(beyond, edge + CELLS) & own)
+    mask = cv2.resize(cells.view(np.uint8), size_wh, interpolation=cv2.INTER_NEAREST) > 0
+    return Pages(mask, np.dstack([shown, np.full_like(shown[..., :1], 255)]), 1, True, paper)
 
 
 def _is_flat(rgba: UInt8[np.ndarray, "height width 4"]) -> bool:

@@ -155,7 +155,7 @@ def figure_warnings(
             *(found.blobs, found.grouping, rgba[:: found.cell_px, :: found.cell_px, :3]),
             *(found.cell_px, [view.name for view in views]),
         ),
-        *_other_groups(found),
+        *_other_groups(found, views, rgba),
         *_like_views(found, views, rgba, chosen=chosen),
         *_scattered_strokes(found, views),
     )
@@ -353,16 +353,25 @@ def _panels(views: list[View], rgba: np.ndarray) -> list[str]:
     ]
 
 
-def _other_groups(found: SheetLayout) -> list[str]:
-    """Return a line for every other group that may be the turnaround, too."""
-    taken = found.groups[found.taken.group]
+def _other_groups(
+    found: SheetLayout, views: list[View], rgba: UInt8[np.ndarray, "height width 4"]
+) -> list[str]:
+    """Return a line for every other group that may be the turnaround."""
+    taken, cell = found.groups[found.taken.group], found.cell_px
+    colors = [view.rgba[view.mask][:, :3] for view in views]
     said = []
+
+    def colors_of(number: int) -> UInt8[np.ndarray, "n 3"]:
+        small = rgba[::cell, ::cell, :3][found.blobs.window(number)]
+        return np.asarray(small[found.blobs.mask(number)])
+
     for number, group in enumerate(found.groups):
         boxes = found.blobs.boxes[group.members]
-        turned = len(taken.members) == 1 and _has_whole(boxes, taken.height)
         if group is taken or found.taken.group:
             continue
-        if not turned and group.merit < AS_LIKELY * taken.merit:
+        small = len(taken.members) == 1 and _has_whole(boxes, taken.height)
+        small = small and all(_shares(colors_of(int(n)), colors) for n in group.members)
+        if not small and group.merit < AS_LIKELY * taken.merit:
             continue
         x, y = (int(v) * found.cell_px for v in boxes[:, :2].min(axis=0))
         said.append(

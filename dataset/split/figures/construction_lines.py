@@ -1,7 +1,8 @@
-"""Find construction lines that stick out of a figure: a centre line below, an eye line beside it.
+"""Find construction lines that stick out of a line drawing: a centre line, an eye line.
 
-They are as thin as lines, straight, level or upright, and end in nothing. Staffs and tails are
-broader, antennae stand above.
+They are as thin as lines, straight, end in nothing, and each is the only one on its side: level to
+the left or right, or upright below. Staffs are broader, antennae stand above, whiskers and legs
+come in pairs.
 """
 
 from __future__ import annotations
@@ -39,17 +40,24 @@ def _loose_ends(mask: Bool[np.ndarray, "height width"]) -> Bool[np.ndarray, "hei
         return lines
     core = dilate(body, by)
     bottom = int(np.flatnonzero(body.any(axis=1))[-1])
+    middle = float(np.flatnonzero(body.any(axis=0)).mean())
     thin = find_blobs(mask & ~core)
     long, off = max(6, round(LONG * tall)), max(3, round(STRAIGHT * tall))
-    for number, (_, y, width, height) in enumerate(thin.boxes.tolist()):
+    sides: dict[str, list[int]] = {"left": [], "right": [], "below": []}
+    for number, (x, y, width, height) in enumerate(thin.boxes.tolist()):
         level, upright = height <= off <= long <= width, width <= off <= long <= height
-        own = thin.labels == number + 1
         if not level and not (upright and y >= bottom - off):
             continue
+        own, window = thin.mask(number), thin.window(number)
         if own.any(axis=0 if level else 1).sum() < FULL * max(width, height):
             continue
-        met = np.nonzero(dilate(own) & core)
-        spread = np.ptp(met[1 if level else 0]) if len(met[0]) else 0
-        if len(met[0]) and spread <= by + off:  # one end is free
-            lines |= own
+        around = tuple(slice(max(part.start - 1, 0), part.stop + 1) for part in window)
+        met = np.nonzero(dilate(thin.labels[around] == number + 1) & core[around])
+        if not len(met[0]) or np.ptp(met[1 if level else 0]) > by + off:
+            continue  # it does not end in nothing
+        side = "below" if upright else "left" if x + width / 2 < middle else "right"
+        sides[side].append(number)
+    for alone in sides.values():  # whiskers and legs come in pairs
+        if len(alone) == 1:
+            lines[thin.window(alone[0])] |= thin.mask(alone[0])
     return lines

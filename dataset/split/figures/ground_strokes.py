@@ -29,7 +29,7 @@ BROAD = 0.2  # of the height, a wash under the feet: a pale shoe is shorter
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """Sketched ground of one figure, if it is any.
+    """What may be sketched ground under one figure.
 
     Attributes:
         mask: its pixels.
@@ -75,7 +75,7 @@ def find_ground_strokes(
 
 def _around_the_feet(box: np.ndarray, shape: tuple[int, ...]) -> tuple[slice, slice]:
     x, y, width, height = (int(value) for value in box)
-    bottom, aside, up = y + height, round(BESIDE * width), round(2 * BAND * height)
+    bottom, aside, up = y + height, round(BESIDE * width), max(2, round(2 * BAND * height))
     return (
         slice(max(bottom - up, 0), min(bottom + up // 4, shape[0])),
         slice(max(x - aside, 0), min(x + width + aside, shape[1])),
@@ -96,6 +96,8 @@ def _ground_of(
         contrast: levels between every pixel and the background.
         tall: the figure's height.
     """
+    if not own.any():
+        return Ground(np.zeros_like(own))
     lowest = int(np.flatnonzero(own.any(axis=1))[-1])
     above = np.broadcast_to(lowest - np.arange(len(own))[:, None], own.shape)
     low, flat, room = (above <= max(1, share * tall) for share in (BAND, FLAT, WASH))
@@ -114,21 +116,30 @@ def _ground_of(
     feet = np.append(False, is_foot)[broad.labels]
     if not (feet & low).any():
         return Ground(np.zeros_like(own))
-    ground = wash | (low & paint & ~dilate(feet, by))
+    strokes = low & paint & ~dilate(feet, by) & ~wash
+    ground = wash | (strokes & ~_reaching(strokes, dilate(own & paint & ~low)))  # a fringe
     away = ground & (distance_to(feet) > 2 * by)
     pieces = find_blobs(away)
     bottom = int(np.flatnonzero(feet.any(axis=1))[-1])
     beside = pieces.boxes[:, 1] <= bottom + by  # lower ones are letters
     away &= np.append(False, beside)[pieces.labels]
-    thick = np.unique(pieces.labels[wider_than(away, by)])
-    strokes = beside.sum() - np.count_nonzero(beside[thick[thick > 0] - 1])
+    counted = np.ones(len(beside) + 1, dtype=bool)
+    counted[np.unique(pieces.labels[wider_than(away, by)])] = False
+    count = int((beside & counted[1:]).sum())
     below = find_blobs(ground)
-    return Ground(
-        ground & np.append(False, below.boxes[:, 1] <= bottom + by)[below.labels],
-        float(away.any(axis=0).sum()) / tall,
-        int(strokes),
-        float(find_blobs(wash).boxes[:, 2].max(initial=0)) / tall,
-    )
+    ground &= np.append(False, below.boxes[:, 1] <= bottom + by)[below.labels]
+    widest = find_blobs(wash).boxes[:, 2].max(initial=0) * _on_both_sides(wash, feet & low)
+    return Ground(ground, float(away.any(axis=0).sum()) / tall, count, float(widest) / tall)
+
+
+def _on_both_sides(
+    wash: Bool[np.ndarray, "height width"], feet: Bool[np.ndarray, "height width"]
+) -> bool:
+    """Return whether a wash reaches farther left and right than the feet; a tail does not."""
+    if not wash.any():
+        return False
+    washed, stood = (np.flatnonzero(mask.any(axis=0)) for mask in (wash, feet))
+    return bool(washed[0] < stood[0] and washed[-1] > stood[-1])
 
 
 def _reaching(

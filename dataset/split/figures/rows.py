@@ -20,8 +20,7 @@ from toonset.dataset.split.figures.text_and_swatches import find_letters
 
 LOWEST = 0.75  # of the group's median height: lower drawings are studies or props
 HIGHEST = 1.45  # of the same: higher ones, too
-HOLLOW = 0.03  # of its box that a patch covers: it is a line round something
-SLENDER = 0.06  # of its longer side: a drawing is no narrower
+THIN = 0.006  # of its longer side, a patch's mean thickness: less is a line
 LARGE = 0.02  # of the largest patch's area: smaller things make no group
 OFF_ROW = 0.05  # of their height: the figures of a row stand on one line
 LEAST_ROW = 3  # figures on one line: they make a row
@@ -137,10 +136,9 @@ def _candidates(blobs: Blobs) -> Int[np.ndarray, " candidates"]:
 
 
 def _are_lines(blobs: Blobs) -> Bool[np.ndarray, " blobs"]:
-    """Return which patches are pieces of a line round the page, drawn by hand: no figure is so."""
-    short, long = blobs.boxes[:, 2:].min(axis=1), blobs.boxes[:, 2:].max(axis=1)
-    hollow = blobs.areas < HOLLOW * short * long
-    return np.asarray(hollow | (short < SLENDER * long))
+    """Find patches that are long lines, such as a frame drawn by hand; a spear is thicker."""
+    sides = blobs.boxes[:, 2:]
+    return np.asarray(blobs.areas < THIN * sides.max(axis=1) * sides.sum(axis=1))
 
 
 def _of_one_height(blobs: Blobs, row: Int[np.ndarray, " row"]) -> list[Int[np.ndarray, " figures"]]:

@@ -6,6 +6,7 @@ import pytest
 
 from tests.dataset.split.test_shadows import fault
 from toonset.dataset.split.sheet import Segmentation, split_picture
+from toonset.errors import SheetError
 
 INK, CLOTH, SKIN = (20, 20, 20, 255), (60, 90, 180, 255), (240, 200, 170, 255)
 TALL, WIDE, VIEWS = 300, 200, 3
@@ -61,3 +62,28 @@ def test_feet_stay(feet: str) -> None:
 @pytest.mark.parametrize("seed", [1759524489, 1390503441, 579572382])
 def test_a_wash_under_a_sheet_of_any_figures_is_left_out(seed: int) -> None:
     assert fault(seed, "ground strokes") == ""
+
+
+@pytest.mark.parametrize("size", [2, 3, 4])
+def test_specks_alone_are_refused_as_ever(size: int) -> None:
+    rgba = np.full((300, 400, 4), 255, np.uint8)
+    for x, y in ((100, 130), (230, 140), (160, 135)):
+        rgba[y : y + size, x : x + size] = INK
+    with pytest.raises(SheetError, match="no figure on the"):
+        split_picture(rgba)
+
+
+@pytest.mark.parametrize("what", ["fringe", "tail"])
+def test_a_fringe_and_a_tail_on_the_ground_stay(what: str) -> None:
+    rgba = page()
+    for middle in range(WIDE // 2, VIEWS * WIDE, WIDE):
+        if what == "fringe":
+            cv2.rectangle(rgba, (middle - 60, 200), (middle + 60, 290), CLOTH, -1)
+            for x in range(middle - 60, middle + 61, 6):
+                cv2.line(rgba, (x, 290), (x, 318), CLOTH, 2)
+        else:
+            cv2.ellipse(rgba, (middle + 55, 308), (40, 10), 0, 0, 360, (225, 215, 205, 255), -1)
+    found = split_picture(rgba)
+    assert "shadows on the ground were left out" not in found.remarks
+    painted_there = int((rgba[..., :3] < 250).any(axis=2).sum())
+    assert painted(found) >= 0.98 * painted_there

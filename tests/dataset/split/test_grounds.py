@@ -405,17 +405,6 @@ def test_a_panel_over_whose_edge_figures_stand() -> None:
     assert any("straight edges" in remark for remark in found.remarks)
 
 
-def test_a_panel_of_clouds_between_bars_is_the_sheet() -> None:
-    clouds = np.random.default_rng(2).normal(0, 1, (HEIGHT, WIDTH)).astype(np.float32)
-    clouds = cv2.GaussianBlur(clouds, (0, 0), 3) > 0
-    slope = np.linspace(0.9, 1, WIDTH)[None, :, None]
-    sky = 16 * clouds[..., None] + np.array((33, 170, 217)) * slope
-    picture, mask = figures(np.clip(sky, 0, 255).astype(np.uint8))
-    rgba = np.full((HEIGHT + 90, WIDTH, 4), (0, 0, 0, 255), np.uint8)
-    rgba[60 : HEIGHT + 60, :, :3] = picture
-    assert_right(rgba, np.pad(mask, ((60, 30), (0, 0))))
-
-
 def test_a_boxy_figure_is_no_panel() -> None:
     rgba = opaque(plain(255, 300, 320))
     cv2.rectangle(rgba, (40, 30), (260, 270), (40, 90, 160, 255), -1)

@@ -77,7 +77,7 @@ def test_cuffs_nearly_as_light_as_the_paper_lie_behind_their_line_and_the_gap_op
     assert alpha_at(picture, 150, 320) == 0
 
 
-@pytest.mark.parametrize(("wide", "high", "alpha"), [(34, 24, 255), (20, 44, 0)])
+@pytest.mark.parametrize(("wide", "high", "alpha"), [(34, 24, 255), (20, 44, 0), (34, 36, 0)])
 def test_a_white_label_that_lies_is_paint_and_a_gap_beside_an_arm_is_none(
     wide: int, high: int, alpha: int
 ) -> None:
