@@ -27,6 +27,7 @@ from toonset.mesh import Mesh
 from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.pixels.labels import UNLABELLED
 
+BODIES = 8
 SIZES_PX = (150, 600)
 OUTLINE = 0.01  # of the cell: 1.5 px at 150, 6 px at 600
 JPEG_QUALITY = 80
@@ -105,14 +106,22 @@ def random_paints(rng: np.random.Generator, count: int) -> list[RGB]:
     return paints
 
 
-def characters(folder: Path | None, seed: int, *, quick: bool) -> Iterator[Mesh]:
+def characters(
+    folder: Path | None, seed: int, *, quick: bool, count: int = BODIES
+) -> Iterator[Mesh]:
     """Yield the characters of a folder, or random bodies in random paints.
+
+    Args:
+        folder: of character folders; None for bodies.
+        seed: of the first body.
+        quick: two characters.
+        count: of bodies otherwise.
 
     Raises:
         BundleError: the folder holds no character with known colours.
     """
     if folder is None:
-        for i in range(2 if quick else 8):
+        for i in range(2 if quick else count):
             yield _painted_body(seed + i)
         return
     found = [place.parent for place in sorted(folder.glob("*/info.json"))]

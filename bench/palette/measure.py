@@ -3,7 +3,8 @@
 A colour is found if it lies within 0.02 in OKLab of a true one; two found colours cannot claim the
 same. Missing is a true colour of 5 % or more that nobody claims; spurious is a found colour that
 claims none. A true colour of less than 5 % may be found or not. Painted sheets, whose paints have
-no one colour, have figures of their own: see `bench.palette.painted`.
+no one colour, and cel sheets, whose paints have several, have figures of their own: see
+`bench.palette.painted` and `bench.palette.cel`.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ import numpy as np
 from jaxtyping import UInt8
 
 from bench.palette.cases import PaletteCase, palette_cases
+from bench.palette.cel import COLUMNS as CEL
+from bench.palette.cel import bench_cel
 from bench.palette.methods import LEAST_SHARE, METHODS, RGB
 from bench.palette.painted import COLUMNS as PAINTED
 from bench.palette.painted import bench_painted
@@ -85,7 +88,8 @@ def bench_palette(
     for (size, name), times in seconds.items():
         records.append(Recorder(name, size, seed).samples(CPU_SECONDS, times, "s"))
     records += bench_painted(cases, seed, quick=quick, progress=progress)
-    return records, methods_table(records, (*COLUMNS[:-1], *PAINTED, COLUMNS[-1]))
+    records += bench_cel(cases, seed, quick=quick, progress=progress)
+    return records, methods_table(records, (*COLUMNS[:-1], *PAINTED, *CEL, COLUMNS[-1]))
 
 
 def score(found: Sequence[RGB], case: PaletteCase) -> Score:

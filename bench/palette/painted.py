@@ -159,18 +159,13 @@ def score_painted(case: PaintedCase, colors: Sequence[RGB], labels: Labels) -> P
         colors: the palette's, tones included.
         labels: of every drawing.
     """
-    tool = importlib.import_module("sklearn.metrics")  # untyped
     known = [true != UNLABELLED for true in case.truths]
     own, true, rgb = (
         np.concatenate([one[mask] for one, mask in zip(of, known, strict=True)])
         for of in (labels, case.truths, [image[..., :3] for image in case.images])
     )
-    both = np.zeros((len(case.shares), 256))
-    np.add.at(both, (true, own), 1)
-    size = both.sum(axis=1)
-    both[:, UNLABELLED] = 0
-    either = size[:, None] + both.sum(axis=0, keepdims=True) - both
-    shared = (both / np.maximum(either, 1)).max(axis=1)
+    shared = label_overlaps(true, own, len(case.shares))
+    size = np.bincount(true, minlength=len(case.shares))
     counted = (case.shares >= SMALL) & (size > 0)
     palette = oklab_from_rgb(np.array(colors, dtype=np.uint8))
     paints = [np.median(rgb[true == number], axis=0) for number in np.flatnonzero(counted)]
@@ -178,8 +173,26 @@ def score_painted(case: PaintedCase, colors: Sequence[RGB], labels: Labels) -> P
     near = np.linalg.norm(middles[:, None] - palette, axis=-1).min(axis=1) < NEAR
     large = case.shares[counted] >= LARGE
     return PaintedScore(
-        float(tool.adjusted_rand_score(true, own)),
+        rand_index(true, own),
         float(shared[counted].mean()),
         float(near[large].mean()),
         float(near.mean()),
     )
+
+
+def rand_index(true: UInt8[np.ndarray, " pixels"], own: UInt8[np.ndarray, " pixels"]) -> float:
+    """Return the adjusted Rand index of pixels' paints and labels; 255 is one more label."""
+    tool = importlib.import_module("sklearn.metrics")  # untyped
+    return float(tool.adjusted_rand_score(true, own))
+
+
+def label_overlaps(
+    true: UInt8[np.ndarray, " pixels"], own: UInt8[np.ndarray, " pixels"], paints: int
+) -> Float[np.ndarray, " paints"]:
+    """Return every paint's intersection over union with the label that is most like it."""
+    both = np.zeros((paints, 256))
+    np.add.at(both, (true, own), 1)
+    size = both.sum(axis=1, keepdims=True)
+    both[:, UNLABELLED] = 0
+    either = size + both.sum(axis=0, keepdims=True) - both
+    return np.asarray((both / np.maximum(either, 1)).max(axis=1))

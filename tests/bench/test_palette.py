@@ -5,12 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.palette.cases import LEAST_APART, PaletteCase, palette_cases, random_paints
+from bench.palette.cases import LEAST_APART, PaletteCase, characters, palette_cases, random_paints
+from bench.palette.cel import GARMENTS, OWN_LABEL, TONES, CelCase, CelOptions, cel_case, score_cel
 from bench.palette.measure import bench_palette, f1, score
 from bench.palette.methods import METHODS
-from bench.palette.painted import PaintedCase, score_painted
+from bench.palette.painted import GROUP, PaintedCase, score_painted
 from toonset.errors import BundleError
 from toonset.palette.colors import oklab_from_rgb
+from toonset.palette.pixels.labels import UNLABELLED
 
 COLORS = np.array([(200, 30, 40), (20, 60, 180), (30, 160, 60)], dtype=np.uint8)
 
@@ -59,8 +61,9 @@ def test_the_bench_runs_and_ours_is_best() -> None:
         for name in METHODS
     }
     assert merit["default"] == max(merit.values())
-    painted = {r.method: r.value for r in records if r.metric == "index of labels"}
-    assert painted["default"] > 0.9 > painted["k-means, true k"]
+    index = {(r.group, r.method): r.value for r in records if r.metric == "index of labels"}
+    for group in (GROUP, CelOptions(3).group):
+        assert index[group, "default"] > 0.9 > index[group, "k-means, true k"]
     assert "1200 x 600" in text
 
 
@@ -75,3 +78,39 @@ def test_labels_of_painted_sheets_are_scored() -> None:
     assert (right.index, right.balanced, right.found) == (1, 1, 1)
     one = score_painted(painted, [red], [np.zeros_like(truth)])
     assert (one.index, one.balanced, one.found) == (0, 0.5, 0.5)
+
+
+def _cel(options: CelOptions) -> CelCase:
+    return cel_case(next(characters(None, 0, quick=True)), 0, options)
+
+
+@pytest.mark.parametrize("tones", [1, 3])
+def test_every_tone_of_a_cel_sheets_paint_is_flat(tones: int) -> None:
+    drawn = _cel(CelOptions(tones))
+    truths = zip(drawn.sheet.images, drawn.sheet.truths, drawn.tones, strict=True)
+    colors: dict[tuple[int, int], set[tuple[int, ...]]] = {}
+    for image, paint, tone in truths:
+        assert image.shape[:2] == paint.shape == tone.shape
+        assert (paint[tone != UNLABELLED] != UNLABELLED).all()
+        told = tone != UNLABELLED
+        for number, step, *rgba in np.unique(
+            np.column_stack([paint[told], tone[told], image[told]]), axis=0
+        ).tolist():
+            colors.setdefault((number, step), set()).add(tuple(rgba))
+    assert {tone for _, tone in colors} == set(range(tones))
+    assert all(len(found) == 1 for found in colors.values())
+
+
+def test_a_cel_sheets_truth_scores_1_and_its_tones_as_paints_less() -> None:
+    drawn = _cel(CelOptions(3, garment=True))
+    truths = drawn.sheet.truths
+    assert drawn.garment is not None
+    assert set(score_cel(drawn, truths, drawn.tones).values()) == {1.0}
+    worn = [np.where(one == drawn.garment, 0, one) for one in truths]
+    assert score_cel(drawn, worn, None)[GARMENTS] == 0
+    assert TONES not in score_cel(drawn, worn, None)
+    both = zip(truths, drawn.tones, strict=True)
+    apart = [np.where(tone == UNLABELLED, tone, 3 * paint + tone) for paint, tone in both]
+    parted = score_cel(drawn, apart, None)
+    assert parted["index of labels"] < 0.8
+    assert parted[OWN_LABEL] < 1
