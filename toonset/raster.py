@@ -144,13 +144,20 @@ def from_nearest(
     return np.asarray(of_source[source])
 
 
-def connected_to(seeds: Mask, free: Mask) -> Mask:
-    """Return the free pixels that are connected to a free seed through free pixels, 4 ways."""
-    numbers = parts(free, connectivity=4)
+def connected_to(seeds: Mask, free: Mask, connectivity: int = 4) -> Mask:
+    """Return the free pixels that are connected to a free seed through free pixels."""
+    numbers = parts(free, connectivity)
     touched = np.zeros(int(numbers.max(initial=0)) + 1, dtype=bool)
     touched[numbers[seeds]] = True
     touched[0] = False
     return np.asarray(touched[numbers])
+
+
+def parts_mostly_in(marked: Mask, place: Mask) -> Mask:
+    """Return the connected parts of a mask of which more than half lies in a place."""
+    numbers, areas = sized_parts(marked)
+    inside = np.bincount(numbers[marked & place], minlength=len(areas))
+    return marked & (inside > 0.5 * areas)[numbers]
 
 
 def parts(marked: Mask, connectivity: int = 8) -> Places:

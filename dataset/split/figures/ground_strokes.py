@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Int, UInt8
 
 from toonset.dataset.split.figures.blobs import Blobs, find_blobs
-from toonset.raster import connected_to, dilate, distance_to, sized_parts, wider_than
+from toonset.raster import connected_to, dilate, distance_to, parts_mostly_in, wider_than
 
 BAND = 0.06  # of the figure's height, from its lowest row up: no strokes lie higher
 WASH = 0.1  # of the same: no wash reaches higher, and most of it lies among the strokes
@@ -21,7 +21,6 @@ FLAT = 0.03  # of the height: a patch of overlapping strokes is no higher
 STROKE = 0.008  # of the height, half a stroke's width
 PALE = 0.5  # of the feet's contrast with the paper: a wash has less
 BESIDE = 0.25  # of the figure's width on both sides: so far ground reaches beyond its box
-MOSTLY = 0.5  # of a wash, among the strokes
 SPREAD = 0.04  # of the height, columns of ground away from the feet
 SCATTERED = 4  # strokes away from the feet: a tail, a staff's tip and toes are fewer
 BROAD = 0.2  # of the height, a wash under the feet: a pale shoe is shorter
@@ -106,10 +105,10 @@ def _ground_of(
     by = max(1, round(STROKE * tall))
     pale = contrast < PALE * np.percentile(contrast[own & low & paint], 90)
     wash = connected_to(dilate(~own & ~paint) & low, room & pale & paint)
-    wash &= ~_reaching(wash, dilate(wider_than(own & pale & paint, by) & ~room))
-    wash &= _mostly(wash, low)
+    wash &= ~connected_to(dilate(wider_than(own & pale & paint, by) & ~room), wash, 8)
+    wash &= parts_mostly_in(wash, low)
     enclosed = own & ~paint
-    enclosed &= ~(flat & _reaching(enclosed, ~low))  # between the legs
+    enclosed &= ~(flat & connected_to(~low, enclosed, 8))  # between the legs
     broad = find_blobs(wider_than((paint & ~wash) | enclosed, by))
     is_foot = broad.boxes[:, 3] >= FLAT * tall
     is_foot[np.unique(broad.labels[~low & own & (broad.labels > 0)]) - 1] = True
@@ -117,7 +116,7 @@ def _ground_of(
     if not (feet & low).any():
         return Ground(np.zeros_like(own))
     strokes = low & paint & ~dilate(feet, by) & ~wash
-    ground = wash | (strokes & ~_reaching(strokes, dilate(own & paint & ~low)))  # a fringe
+    ground = wash | (strokes & ~connected_to(dilate(own & paint & ~low), strokes, 8))  # a fringe
     away = ground & (distance_to(feet) > 2 * by)
     pieces = find_blobs(away)
     bottom = int(np.flatnonzero(feet.any(axis=1))[-1])
@@ -140,23 +139,3 @@ def _on_both_sides(
         return False
     washed, stood = (np.flatnonzero(mask.any(axis=0)) for mask in (wash, feet))
     return bool(washed[0] < stood[0] and washed[-1] > stood[-1])
-
-
-def _reaching(
-    mask: Bool[np.ndarray, "height width"], place: Bool[np.ndarray, "height width"]
-) -> Bool[np.ndarray, "height width"]:
-    """Return the parts of a mask that reach a place."""
-    numbers, areas = sized_parts(mask)
-    reached = np.zeros(len(areas), dtype=bool)
-    reached[np.unique(numbers[place])] = True
-    reached[0] = False
-    return np.asarray(reached[numbers])
-
-
-def _mostly(
-    mask: Bool[np.ndarray, "height width"], place: Bool[np.ndarray, "height width"]
-) -> Bool[np.ndarray, "height width"]:
-    """Return the parts of a mask of which most lies in a place."""
-    numbers, areas = sized_parts(mask)
-    inside = np.bincount(numbers[mask & place], minlength=len(areas))
-    return mask & (inside >= MOSTLY * areas)[numbers]

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.dataset.split.figures.blobs import Blobs
-from toonset.raster import dilate
+from toonset.raster import dilate, parts_mostly_in
 
 OFF_MEAN = 0.2  # of the noise: so far a whole patch may be off
 LEAST_AREA = 0.01  # of the figure's area, with its edge
@@ -154,23 +154,11 @@ def _shadow_of(
     if not shadow.any():
         return shadow
     reach = EDGE * body.shape[0]
-    shadow |= _mostly(dim.smooth & body, _grown(shadow, reach, dim.mask & room))
+    shadow |= parts_mostly_in(dim.smooth & body, _grown(shadow, reach, dim.mask & room))
     darkest = float(np.percentile(dim.light[shadow], 2))
     shadow = _grown(shadow, reach, dim.mask & body & (dim.light >= darkest - TONE))
     fits = _stands_in(body & ~shadow, shadow, FEET if soft else FEET_OF_HARD)
     return shadow if fits else np.zeros_like(body)
-
-
-def _mostly(
-    smooth: Bool[np.ndarray, "height width"], shadow: Bool[np.ndarray, "height width"]
-) -> Bool[np.ndarray, "height width"]:
-    """Return the smooth patches of which most is shadow already: with its darker core."""
-    count, found = cv2.connectedComponents(smooth.view(np.uint8), connectivity=8)
-    labels = np.asarray(found, dtype=np.int32)
-    sizes = np.bincount(labels.ravel(), minlength=count)
-    inside = np.bincount(labels[shadow], minlength=count) > 0.5 * sizes
-    inside[0] = False
-    return inside[labels]
 
 
 def _toned(
