@@ -319,6 +319,7 @@ NO_MEANING = [
 ]
 NO_OPTIONS = [
     ({"steps": 0}, "steps: 0 is out of range; give 1 to 10000000"),
+    ({"steps": True}, "steps: True is out of range; give 1 to 10000000"),
     ({"seed": -1}, "seed: -1"),
     ({"seed": 2**70}, "seed: "),
     ({"budget_s": float("nan")}, "budget_s: nan"),

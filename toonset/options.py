@@ -194,10 +194,11 @@ def _wrong(one: OptionField, value: Any) -> str | None:
         return None
     low = -MOST_NUMBER if option.least is None else option.least
     high = MOST_NUMBER if option.most is None else option.most
-    numbers: Any = Integral if one.kinds == (int,) else Real
-    if isinstance(value, numbers) and low <= value <= high:  # NaN is in no range
+    kind: Any = Integral if one.kinds == (int,) else Real
+    is_number = isinstance(value, kind) and not isinstance(value, bool)
+    if is_number and low <= value <= high:  # NaN is in no range
         return None
-    if option.most is None and not (isinstance(value, numbers) and value > high):
+    if option.most is None and not (is_number and value > high):
         return f"{value} is out of range; give {low:.15g} or more"
     return f"{value} is out of range; give {low:.15g} to {_number(high)}"
 

@@ -23,7 +23,7 @@ from typing import Any
 import typer
 
 from toonset.cli.common.body import is_no_body
-from toonset.cli.common.flags import arguments_of, command_of, each_of
+from toonset.cli.common.flags import Given, arguments_of, command_of, each_of
 from toonset.cli.common.help import Verb
 from toonset.cli.common.output import Keeper
 from toonset.cli.common.refusals import refusal
@@ -214,7 +214,8 @@ def _check_values(values: Mapping[str, Any]) -> None:
     from toonset.dataset.split_folder.view_labels import parse_labels
     from toonset.palette.extract import rule_of
 
-    for options in values.values():
+    for given in values.values():
+        options = given.over(given.kind()) if isinstance(given, Given) else given
         if isinstance(options, PaletteOptions):
             rule_of(replace(options, keep="") if is_url(options.keep) else options)
         elif is_described(type(options)) and hasattr(options, "check"):
