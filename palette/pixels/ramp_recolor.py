@@ -18,15 +18,15 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.palette.colors import oklab_from_rgb, rgb_from_oklab
 from toonset.palette.pixels.labels import UNLABELLED
-from toonset.raster import dilate, erode, nearest, wider_than
+from toonset.raster import dilate, erode, nearest
 
 SOFT_PX = 2  # from a border to where a colour is pure
 BESIDE_PX = 2.0  # deviation of the window in which pure colours beside a border are averaged
-THIN_PX = 1  # half of a strip's width, at most, that may be a blend
+AROUND = 3  # paints around a strip of one pixel, the nearest, that it may be a blend of
 BLEND = 40.0  # levels of 255: what is nearer to a mixture is one, in whatever shade
 LEAST = 1e-3  # of a window: less of a colour is not seen there
 DARKEST = 0.02  # lightness: below, hue says nothing
@@ -126,28 +126,45 @@ def recolor_shaded(picture: Picture, labels: Map, old: Colors, new: Colors) -> P
 def _without_blends(color: Float[np.ndarray, "height width 3"], labels: Map, drawn: Mask) -> Map:
     """Return labels without strips that are no paint: mixtures of the two on their sides.
 
-    A border's blend may lie on a third paint's ramp. It is a strip of that paint with none of its
-    pure colour near, and in colour between those beside it.
+    A border's blend may lie on a third paint's ramp. It is a strip of that paint, a pixel wide,
+    with none of its pure colour near, and in colour between those beside it.
     """
     kinds = np.unique(labels[drawn])
-    owns = [drawn & (labels == kind) for kind in kinds]
-    strip = np.any([own & ~wider_than(own, THIN_PX) for own in owns], axis=0)
+    strip = drawn & ~_in_squares(np.where(drawn, labels.astype(np.int16), np.int16(-1)))
     if len(kinds) < 3 or not strip.any():
         return labels
-    sides = [_beside(color, erode(own, SOFT_PX), strip) for own in owns]
     here, own = color[strip], np.searchsorted(kinds, labels[strip])
-    best, least = own.copy(), np.full(len(own), BLEND**2, np.float32)
-    for i, j in itertools.combinations(range(len(kinds)), 2):
-        (one, there), (other, beyond) = sides[i], sides[j]
-        way = other - one
-        share = ((here - one) * way).sum(axis=1) / np.maximum((way**2).sum(axis=1), 1.0)
+    alone = np.zeros(len(own), np.bool_)
+    number, mass = np.zeros((AROUND, len(own)), np.int64), np.zeros((AROUND, len(own)), np.float32)
+    mean = np.zeros((AROUND, len(own), 3), np.float32)
+    for kind, label in enumerate(kinds):
+        seen, weight = _around(color, erode(drawn & (labels == label), SOFT_PX), strip)
+        alone |= (own == kind) & (weight < LEAST)
+        least = mass.argmin(axis=0)
+        (more,) = np.nonzero((weight >= LEAST) & (weight > mass.min(axis=0)))
+        place = least[more], more
+        number[place], mass[place], mean[place] = kind, weight[more], seen[more]
+    best, nearest_off = own.copy(), np.full(len(own), BLEND**2, np.float32)
+    for i, j in itertools.combinations(range(AROUND), 2):
+        way = mean[j] - mean[i]
+        share = ((here - mean[i]) * way).sum(axis=1) / np.maximum((way**2).sum(axis=1), 1.0)
         share = share.clip(0, 1)
-        off = ((here - one - share[:, None] * way) ** 2).sum(axis=1)
-        better = there & beyond & (own != i) & (own != j) & (off < least)
-        best[better], least[better] = np.where(share > 0.5, j, i)[better], off[better]
-    alone = ~np.stack([there for _, there in sides])[own, np.arange(len(own))]
+        off = ((here - mean[i] - share[:, None] * way) ** 2).sum(axis=1)
+        better = alone & (mass[i] > 0) & (mass[j] > 0) & (off < nearest_off)
+        chosen = np.where(share > 0.5, number[j], number[i])
+        best[better], nearest_off[better] = chosen[better], off[better]
     found = labels.copy()
-    found[strip] = np.where(alone, kinds[best], labels[strip])
+    found[strip] = kinds[best]
+    return found
+
+
+def _in_squares(labels: Int[np.ndarray, "height width"]) -> Mask:
+    """Return where a pixel is in a square of four pixels with one label."""
+    same = (labels[:-1] == labels[1:])[:, :-1] & (labels[:-1] == labels[1:])[:, 1:]
+    same &= (labels[:, :-1] == labels[:, 1:])[:-1]
+    found = np.zeros(labels.shape, np.bool_)
+    for rows, columns in itertools.product((slice(-1), slice(1, None)), repeat=2):
+        found[rows, columns] |= same
     return found
 
 
@@ -192,7 +209,15 @@ def _beside(
     color: Float[np.ndarray, "height width 3"], side: Mask, edge: Mask
 ) -> tuple[Float[np.ndarray, "n 3"], Bool[np.ndarray, " n"]]:
     """Return a side's mean colours around some pixels, and which of them see it."""
+    mean, mass = _around(color, side, edge)
+    return mean, mass >= LEAST
+
+
+def _around(
+    color: Float[np.ndarray, "height width 3"], side: Mask, edge: Mask
+) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, " n"]]:
+    """Return a side's mean colours around some pixels, and its share of what is there."""
     weight = side.astype(np.float32)
     mass = cv2.GaussianBlur(weight, (0, 0), BESIDE_PX)[edge]
     total = cv2.GaussianBlur(color * weight[..., None], (0, 0), BESIDE_PX)[edge]
-    return total / np.maximum(mass, LEAST)[:, None], mass >= LEAST
+    return total / np.maximum(mass, LEAST)[:, None], mass

@@ -1,5 +1,7 @@
 """Paints of drawings that are shaded throughout: laws, ramps, labels, recolouring."""
 
+from time import process_time
+
 import numpy as np
 import pytest
 
@@ -17,7 +19,11 @@ from toonset.palette.paints.select import PaletteRule
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.patches import Patches, find_patches, smooth_lab
 from toonset.palette.pixels.ramp_labels import Ramp, savings
-from toonset.palette.pixels.ramp_recolor import find_shaded_mixtures, recolor_shaded
+from toonset.palette.pixels.ramp_recolor import (
+    _without_blends,
+    find_shaded_mixtures,
+    recolor_shaded,
+)
 from toonset.palette.recolor import recolor_drawing
 from toonset.palette.shaded import find_shaded_palette, is_shaded, ramps_of
 from toonset.raster import erode
@@ -202,6 +208,31 @@ def test_a_blend_on_a_third_paints_ramp_does_not_shine() -> None:
     blends = recolor_shaded(picture, labels, old, new)[:50, 40, :3].astype(int)
     wanted = light[:50, 40] * (new[0].astype(float) + tan) / 2
     assert np.abs(blends - wanted).max() < 12
+
+
+@pytest.mark.parametrize("wide", [2, 3])
+def test_a_trim_in_a_colour_between_its_neighbours_is_recoloured(wide: int) -> None:
+    old = np.array([(110, 70, 40), (240, 220, 190), (175, 140, 90)], np.uint8)
+    labels = np.where(np.arange(80) < 40, 0, 1).astype(np.uint8) * np.ones((80, 1), np.uint8)
+    labels[:, 40 : 40 + wide] = labels[70:, :10] = 2
+    picture = np.dstack([old[labels], np.full(labels.shape, 255, np.uint8)])
+    new = old.copy()
+    new[2] = (60, 90, 220)
+    turned = recolor_shaded(picture, labels, old, new)
+    assert (turned[:60, 40 : 40 + wide, :3] == new[2]).all()
+
+
+def test_many_paints_cost_little_more_than_few() -> None:
+    rng = np.random.default_rng(0)
+    seconds = []
+    for count in (10, 60):
+        labels = np.kron(rng.integers(0, count, (50, 50)), np.ones((6, 6), int)).astype(np.uint8)
+        labels[:, ::17] = rng.integers(0, count, labels[:, ::17].shape)
+        color = rng.integers(30, 225, (count, 3)).astype(np.float32)[labels]
+        start = process_time()
+        _without_blends(color, labels, np.ones(labels.shape, np.bool_))
+        seconds.append(process_time() - start)
+    assert seconds[1] < 15 * seconds[0] + 0.1  # pairs are 39 times as many
 
 
 def test_mixtures_of_shaded_paints_are_what_borders_are_made_of() -> None:
