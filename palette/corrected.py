@@ -21,9 +21,9 @@ from toonset.palette.color_names import name_of, with_codes
 from toonset.palette.corrections import PaletteCorrections, Stroke
 from toonset.palette.extract import IN_LIGHT, LINE, PaintMap, in_light, maps_in_light
 from toonset.palette.names import RGB, hex_of, rgb_of_hex
-from toonset.palette.palette import ContourColor, Palette, PaletteColor, Tone
+from toonset.palette.palette import MOST_TONES, ContourColor, Palette, PaletteColor, Tone
 from toonset.palette.pixels.antialias import OPAQUE
-from toonset.palette.pixels.cel_tones import MOST_TONES, step_tones
+from toonset.palette.pixels.cel_tones import step_tones
 from toonset.palette.pixels.labels import UNLABELLED, Space, nearest_colors
 from toonset.palette.pixels.ramp_labels import Ramp
 from toonset.palette.pixels.shadow import apply_shadow

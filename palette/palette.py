@@ -18,6 +18,8 @@ from toonset.errors import PaletteError
 from toonset.palette.names import RGB, clean_name, hex_of, one_line, rgb_of_hex
 from toonset.palette.options import MAX_COLORS
 
+MOST_TONES = 4  # of a paint that is shaded in steps
+
 
 def _of_hex(text: object) -> RGB:
     try:
@@ -194,10 +196,33 @@ class Palette:
         """Refuse palettes that cannot label anything.
 
         Raises:
-            PaletteError: no colour, or more than 255.
+            PaletteError: no colour, or more than 255; steps that are no tones of their paints.
         """
         if not 1 <= len(self.colors) <= MAX_COLORS:
             raise PaletteError(f"palette: {len(self.colors)} colours; 1 to {MAX_COLORS} are needed")
+        if self.stepped:
+            self._check_steps()
+
+    def _check_steps(self) -> None:
+        """Refuse steps that cannot label anything; see `__post_init__`."""
+        for color in self.colors:
+            if not 1 <= len(color.tones) <= MOST_TONES:
+                raise PaletteError(
+                    f"palette: {hex_of(color.rgb)} is shaded in steps and has {len(color.tones)} "
+                    f"tones; 1 to {MOST_TONES} are needed"
+                )
+            if color.tones[0].rgb != color.rgb:
+                raise PaletteError(
+                    f"palette: the first tone of {hex_of(color.rgb)} is "
+                    f"{hex_of(color.tones[0].rgb)}; it must be the colour itself"
+                )
+        count = sum(len(color.tones) for color in self.colors)
+        if count > MAX_COLORS:
+            raise PaletteError(f"palette: {count} tones; at most {MAX_COLORS} can be told apart")
+        if self.shadow is not None:
+            raise PaletteError(
+                "palette: it is shaded in steps and has a shadow; only one of these can be"
+            )
 
     @property
     def has_ramps(self) -> bool:

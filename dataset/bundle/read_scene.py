@@ -25,8 +25,7 @@ from toonset.errors import BundleError
 from toonset.lock import settle
 from toonset.options import SYMMETRIC, Symmetric
 from toonset.palette.formats.json import read_palette_json
-from toonset.palette.palette import Palette
-from toonset.palette.pixels.cel_tones import MOST_TONES
+from toonset.palette.palette import MOST_TONES, Palette
 from toonset.palette.pixels.labels import UNLABELLED
 from toonset.palette.shaded import ramps_of
 

@@ -86,6 +86,8 @@ def palette_of(content: Any, where: str) -> Palette:
         return PALETTE.validate_json(json.dumps(content), strict=True)
     except ValidationError as error:
         raise PaletteError(f"{where}: {validation_reason(error)}") from error
+    except PaletteError as error:
+        raise PaletteError(f"{where}: {error}") from error
 
 
 def _swatches(entry: Any, where: str) -> list[NamedColor]:

@@ -23,7 +23,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 from scipy.special import log_ndtr
 
 from toonset.palette.names import RGB
-from toonset.palette.palette import Palette, PaletteColor, Tone
+from toonset.palette.palette import MOST_TONES, Palette, PaletteColor, Tone
 from toonset.palette.pixels.antialias import OPAQUE
 from toonset.palette.pixels.labels import (
     UNLABELLED,
@@ -38,7 +38,6 @@ from toonset.palette.pixels.recolor import tones_of
 from toonset.palette.pixels.shadow import FLOOR, LINE
 from toonset.raster import dilate, is_uniform, nearest
 
-MOST_TONES = 4
 LEAST_DROP, MOST_DROP = 0.06, 0.8  # logarithms, the channels' mean, from one tone to the next
 UNLIKE = 0.2  # logarithms that channels may differ in: light that is not quite white
 TOLD = 24  # levels of a channel in light: darker ones say nothing of a ratio
@@ -82,6 +81,8 @@ def find_steps(
         contours: how far lines cover their pixels.
         colors: that they have, small areas' included.
     """
+    if len(colors) < 2:
+        return []
     logs = np.log(colors / 255 + FLOOR)
     shade = _darker(colors, logs)
     if not shade.any():
@@ -202,7 +203,7 @@ def _darker(
 ) -> Bool[np.ndarray, "colors colors"]:
     """Return which colours may be the next darker tone of which, by their channels alone.
 
-    A channel that is nearly black in light, too, says nothing.
+    A channel that is nearly black in light, too, says nothing. All channels' mean is an order.
     """
     drop = logs[None, :] - logs[:, None]  # of the first, darker, below the second
     told = np.broadcast_to(colors[None, :] >= TOLD, drop.shape)
@@ -211,7 +212,8 @@ def _darker(
     mean = np.where(told, drop, 0).sum(axis=-1) / np.maximum(told.sum(axis=-1), 1)
     alike = (least > 0) & (most - least <= UNLIKE)
     black = (told | (drop > -UNLIKE)).all(axis=-1) & told.any(axis=-1)
-    return np.asarray(alike & black & (mean >= LEAST_DROP) & (mean <= MOST_DROP))
+    order = drop.mean(axis=-1) > 0
+    return np.asarray(alike & black & order & (mean >= LEAST_DROP) & (mean <= MOST_DROP))
 
 
 def _areas(picture: Picture, contour: Map, colors: UInt8[np.ndarray, "n 3"]) -> Areas:

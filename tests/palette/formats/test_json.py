@@ -36,6 +36,22 @@ GOOD: dict[str, Any] = to_json(PALETTE)
 COLOR: dict[str, Any] = GOOD["colors"][0]
 
 
+def _toned(count: int) -> dict[str, Any]:
+    """Return a colour with so many tones, the first its own."""
+    tones = [{"hex": f"#{200 - 20 * n:02x}1e28", "share": 0.1} for n in range(count)]
+    return COLOR | {"tones": tones}
+
+
+STEPPED: dict[str, Any] = GOOD | {"stepped": True, "colors": [_toned(1), _toned(4)]}
+SHADOW = {"factor": [0.5] * 3, "spread": [0.1] * 3, "bits": 20.0}
+
+
+def test_a_palette_with_steps_comes_back() -> None:
+    palette = palette_of(STEPPED, "p")
+    assert [len(color.tones) for color in palette.colors] == [1, 4]
+    assert palette_of(to_json(palette), "p") == palette
+
+
 def test_a_palette_comes_back(tmp_path: Path) -> None:
     file = tmp_path / "a.json"
     for palette in (PALETTE, Palette(PALETTE.colors, "typed")):
@@ -105,6 +121,14 @@ def test_foreign_text_prints_as_one_line() -> None:
         (GOOD | {"dropped": [COLOR]}, r"dropped\.0\.oklab_cost: Field required"),
         (GOOD | {"contour": COLOR}, r"contour\.cloth: Field required"),
         (GOOD | {"rule": None}, "rule: Input should be a valid string"),
+        (GOOD | {"stepped": True}, "#c81e28 is shaded in steps and has 0 tones; 1 to 4 are"),
+        (STEPPED | {"colors": [_toned(5)]}, "#c81e28 is shaded in steps and has 5 tones"),
+        (
+            STEPPED | {"colors": [_toned(2) | {"hex": "#c81e29"}]},
+            "the first tone of #c81e29 is #c81e28; it must be the colour itself",
+        ),
+        (STEPPED | {"colors": [_toned(4)] * 64}, "256 tones; at most 255 can be told apart"),
+        (STEPPED | {"shadow": SHADOW}, "it is shaded in steps and has a shadow"),
     ],
 )
 def test_bad_palette_json(content: object, fragment: str, tmp_path: Path) -> None:
