@@ -19,11 +19,11 @@ from toonset.palette.formats.registry import (
 from toonset.palette.named import with_names
 from toonset.palette.names import RGB
 from toonset.palette.options import MAX_COLORS, PaletteOptions
-from toonset.palette.paints.extract import PICKED, find_palette, pick_palette
+from toonset.palette.paints.extract import PICKED, find_palette, pick_palette, rule_in_words
 from toonset.palette.paints.features import find_features
 from toonset.palette.paints.grainy_colors import read_drawn_colors
 from toonset.palette.paints.places import add_places
-from toonset.palette.paints.select import PaletteRule
+from toonset.palette.paints.select import PaletteRule, nearest_found
 from toonset.palette.palette import Palette, PaletteColor, Shadow, Tone
 from toonset.palette.pixels.cel_tones import find_steps, step_labels, step_tones, with_steps
 from toonset.palette.pixels.enlarged import common_grids
@@ -43,6 +43,7 @@ from toonset.palette.shaded import (
     ramps_of,
     shaded_labels,
 )
+from toonset.raster import dilate, is_uniform
 from toonset.view import View
 
 Picture = UInt8[np.ndarray, "height width 4"]
@@ -52,6 +53,7 @@ Mask = Bool[np.ndarray, "height width"]
 LINE = 128  # of 255: covered by half, a pixel is a drawn line's
 NEVER_IN_LIGHT = 0.95  # of a paint's pixels lie in shadow
 LEAST_STEP = 0.008  # of the character: smaller tones are not told from blends
+SMOOTHED_PX = 2  # from a tone's border: there smoothing has moved it
 IN_LIGHT, IN_SHADOW = 0, 1  # tones; UNLABELLED where there is no paint
 
 
@@ -219,11 +221,13 @@ def _chosen(
     if picked is not None:
         palette = pick_palette(lit, picked, lines)
     else:
-        palette = _of_sheet(lit, options, lines, shadow, printed)
-        drawn = palette if shadow is None else find_palette(smooth, options, lines)
-        steps = _stepped(drawn, smooth, contours, options, 2 if shadow is None else 3)
-        if steps is not None:
-            return steps
+        flat = _of_sheet(lit, options, lines, shadow, printed) if shadow is None else None
+        drawn = flat or find_palette(smooth, replace(options, keep=()), lines)
+        steps = _find_steps(drawn, smooth, contours, options, 2 if shadow is None else 3)
+        stepped = None if steps is None else _stepped(steps, pictures, smooth, lines, printed)
+        if stepped is not None:
+            return stepped
+        palette = flat or _of_sheet(lit, options, lines, shadow, printed)
         invented = None if shadow is None else _never_in_light(lit, dark, palette)
         if shadow is not None and invented is not None:
             dark = [shade & ~off for shade, off in zip(dark, invented, strict=True)]
@@ -241,14 +245,34 @@ def _chosen(
     return with_own_shadows(palette, lit, paint, contours, options.keep)
 
 
-def _stepped(
+@dataclass(frozen=True, eq=False)
+class _Steps:
+    """Plan of a palette whose paints are shaded in steps.
+
+    Attributes:
+        paints: the tones of paints that have several, from light to dark.
+        stay: found colours that the user keeps.
+        options: of the choice.
+        rule: keeps all these tones, as colours of their own.
+    """
+
+    paints: list[list[RGB]]
+    stay: tuple[RGB, ...]
+    options: PaletteRule
+    rule: PaletteRule
+
+
+def _find_steps(
     found: Palette,
     pictures: Sequence[Picture],
     contours: Sequence[Map],
     options: PaletteRule,
     least: int,
-) -> Palette | None:
-    """Return the palette of drawings that are shaded in steps; None of others.
+) -> _Steps | None:
+    """Return the steps that drawings are shaded in; None where they are not.
+
+    Paints are tones that together reach the rule's share, the largest of them and of the other
+    colours if there are too many. A colour to keep is no paint's darker tone.
 
     Args:
         found: their palette as they are drawn, each tone a colour.
@@ -260,23 +284,74 @@ def _stepped(
     known = {one.rgb: one.share for one in found.dropped}
     known |= {one.rgb: one.share for one in found.colors}
     colors = [rgb for rgb, share in known.items() if share >= LEAST_STEP]
-    steps = find_steps(pictures, contours, np.array(colors, np.uint8))
+    steps = find_steps(pictures, contours, np.array(colors, np.uint8).reshape(-1, 3))
     if max(map(len, steps), default=0) < least:
         return None
-    paints = [[colors[n] for n in tones] for tones in steps]
-    paints = [[rgb for rgb in tones if rgb not in options.keep] for tones in paints]
-    paints = [tones for tones in paints if sum(map(known.__getitem__, tones)) >= options.min_share]
-    tones = tuple(rgb for own in paints for rgb in own)
-    wider = replace(
-        options,
-        keep=(*options.keep, *tones),
-        max_colors=min(MAX_COLORS, options.max_colors + len(tones) - len(paints)),
-    )
-    lines = [contour >= LINE for contour in contours]
-    return replace(
-        with_steps(_in_light(pictures, wider, lines), paints, options.min_share, options.keep),
-        rule=found.rule,
-    )
+    stay = tuple(dict.fromkeys(nearest_found(rgb, list(known)) for rgb in options.keep))
+    chains = [[colors[n] for n in tones] for tones in steps]
+    chains = [[tones[0], *(one for one in tones[1:] if one not in stay)] for tones in chains]
+    chains = [tones for tones in chains if len(tones) > 1]
+    shares = {tones[0]: sum(map(known.__getitem__, tones)) for tones in chains}
+    others = known.keys() - {rgb for tones in chains for rgb in tones} - {*stay}
+    room = options.max_colors - len(options.keep)
+    rivals = sorted((*(shares.keys() - {*stay}), *others), key=lambda n: -shares.get(n, known[n]))
+    first = {*stay, *rivals[:room]}
+    paints = [
+        tones
+        for tones in chains
+        if tones[0] in first and (tones[0] in stay or shares[tones[0]] >= options.min_share)
+    ]
+    tones = [rgb for own in paints for rgb in own if rgb not in stay]
+    lights = sum(own[0] not in stay for own in paints)
+    most = min(MAX_COLORS, options.max_colors + len(tones) - lights)
+    if not paints or len(options.keep) + len(tones) > most:
+        return None
+    kept = {rgb for own in paints for rgb in own}
+    shades = tuple(rgb for own in chains for rgb in own[1:] if rgb not in kept)
+    rule = replace(options, keep=(*options.keep, *tones), max_colors=most, shades=shades)
+    return _Steps(paints, stay, options, rule)
+
+
+def _stepped(
+    steps: _Steps,
+    pictures: Sequence[Picture],
+    smooth: Sequence[Picture],
+    lines: Sequence[Mask],
+    printed: Printed,
+) -> Palette | None:
+    """Return the palette of drawings that are shaded in steps.
+
+    None where printed colours are the paints: which of them are tones of which is not known.
+
+    Args:
+        steps: of the drawings.
+        pictures: with their grain.
+        smooth: without it.
+        lines: where lines are drawn.
+        printed: the palette that the sheet prints.
+    """
+    palette = _of_sheet(smooth, steps.rule, lines, None, printed)
+    if palette.evidence is None:
+        return None
+    meant = {one: one for own in steps.paints for one in own}
+    if not meant.keys() <= {color.rgb for color in palette.colors}:
+        return None
+    stay = steps.stay
+    if noise_levels(pictures) >= LEAST_LEVELS:
+        labels = [nearest_labels(picture, palette.rgb) for picture in smooth]
+        apart = [
+            line | dilate(~is_uniform(own), SMOOTHED_PX)
+            for line, own in zip(lines, labels, strict=True)
+        ]
+        read = read_drawn_colors(palette, pictures, smooth, apart)
+        new = dict(zip((c.rgb for c in palette.colors), (c.rgb for c in read.colors), strict=True))
+        if len(set(new.values())) == len(new):
+            palette, meant = read, {rgb: new[rgb] for rgb in meant}
+            stay = tuple(new.get(rgb, rgb) for rgb in stay)
+    paints = [[meant[one] for one in own] for own in steps.paints]
+    found = with_steps(palette, paints, steps.options.min_share, stay)
+    found = replace(found, rule=rule_in_words(steps.options, palette.contour))
+    return in_printed_order(found, palette.printed) if palette.printed else found
 
 
 def _of_sheet(
@@ -328,6 +403,7 @@ def _in_light(
     """Return the palette of pictures in light, with features."""
     palette = find_palette(pictures, options, lines)
     found = find_features(palette, pictures, shadow) if options.features is not False else ()
+    found = tuple(rgb for rgb in found if rgb not in options.shades)
     found = found[: options.max_colors - len(palette.colors)]
     if found:
         wider = replace(options, keep=(*options.keep, *found))

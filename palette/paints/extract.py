@@ -72,7 +72,9 @@ def find_palette(
     warnings += lone_spot_notes(histogram, [*whole, *tiny])
     contour = None if ink is None else _contour(amounts[ink])
     dropped = _dropped(left, hidden, histogram, colors)
-    return Palette(colors, _rule(options, contour), dropped, warnings, contour, found.evidence)
+    return Palette(
+        colors, rule_in_words(options, contour), dropped, warnings, contour, found.evidence
+    )
 
 
 def pick_palette(
@@ -146,7 +148,7 @@ def _histogram(images: Images) -> Histogram:
     return histogram
 
 
-def _rule(options: PaletteRule, contour: ContourColor | None) -> str:
+def rule_in_words(options: PaletteRule, contour: ContourColor | None) -> str:
     """Return the rule in words; shares that it names are of the same pixels as the colours'."""
     least = 100 * options.min_share
     words = [f"at least {least:g} % of the character's pixels"]

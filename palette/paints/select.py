@@ -35,6 +35,7 @@ class PaletteRule:
         contour: count the drawn lines to their colour, as the paper does; False leaves that colour
             to what else is painted with it. Matters only where the lines are given.
         features: keep small colours that recur at one place of the character; None: as True.
+        shades: colours that are no features: tones of paints that are left out.
     """
 
     min_share: float = USUAL.min_share
@@ -42,6 +43,7 @@ class PaletteRule:
     keep: tuple[RGB, ...] = ()
     contour: bool = USUAL.contour
     features: bool | None = USUAL.features
+    shades: tuple[RGB, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse more colours to keep than are wanted.
@@ -145,6 +147,11 @@ def choose(
     return kept, left, (warning,)
 
 
+def nearest_found(rgb: RGB, colors: Sequence[RGB]) -> RGB:
+    """Return which of the colours that were found is meant by one to keep."""
+    return colors[int(_away_from(colors, rgb).argmin())]
+
+
 def _keep_notes(wanted: Sequence[Amount], options: PaletteRule) -> tuple[str, ...]:
     """Return what was kept for colours that are not in the pictures as typed."""
     return tuple(
@@ -157,7 +164,11 @@ def _keep_notes(wanted: Sequence[Amount], options: PaletteRule) -> tuple[str, ..
 
 def _away(paints: Sequence[Paint], rgb: RGB) -> Float[np.ndarray, " paints"]:
     """Return how far the paints are from a colour in OKLab."""
-    found = oklab_from_rgb(np.array([paint.rgb for paint in paints], dtype=np.uint8))
+    return _away_from([paint.rgb for paint in paints], rgb)
+
+
+def _away_from(colors: Sequence[RGB], rgb: RGB) -> Float[np.ndarray, " colors"]:
+    found = oklab_from_rgb(np.array(colors, dtype=np.uint8))
     return np.linalg.norm(found - oklab_from_rgb(np.array(rgb, dtype=np.uint8)), axis=1)
 
 

@@ -8,12 +8,14 @@ import pytest
 from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.corrected import correct_palette
 from toonset.palette.corrections import PaletteCorrections
-from toonset.palette.extract import extract_palette, paint_maps
+from toonset.palette.extract import choose_palette, extract_palette, paint_maps
 from toonset.palette.formats.json import palette_of, to_json
 from toonset.palette.names import hex_of
-from toonset.palette.palette import Palette
-from toonset.palette.pixels.cel_tones import MOST_TONES, find_steps, tone_colors
+from toonset.palette.options import PaletteOptions
+from toonset.palette.palette import MOST_TONES, Palette
+from toonset.palette.pixels.cel_tones import _darker, find_steps, tone_colors
 from toonset.palette.pixels.ink_lines import find_contours
+from toonset.palette.pixels.shadow import FLOOR
 from toonset.palette.recolor import recolor_drawing
 from toonset.raster import erode
 
@@ -132,11 +134,91 @@ def test_a_darker_garment_of_the_same_hue_stays_a_paint(light: float) -> None:
     assert tuple(vest.astype(int).tolist()) in [color.rgb for color in palette.colors]
 
 
-def test_a_colour_to_keep_is_no_tone() -> None:
+@pytest.mark.parametrize("off", [0, 1])
+@pytest.mark.parametrize("tone", [1, 2])
+def test_a_colour_to_keep_is_no_tone(tone: int, off: int) -> None:
     pictures = _drawn(3)[0]
-    shade = extract_palette(pictures).colors[0].tones[1].rgb
-    kept = extract_palette(pictures, keep="#{:02x}{:02x}{:02x}".format(*shade))
+    shade = extract_palette(pictures).colors[0].tones[tone].rgb
+    red, green, blue = (level + off for level in shade)
+    kept = extract_palette(pictures, PaletteOptions(keep=hex_of((red, green, blue))))
+    assert kept.stepped
     assert shade in [color.rgb for color in kept.colors]
+    assert shade not in [one.rgb for c in kept.colors for one in c.tones if one.rgb != c.rgb]
+    assert f"kept by hand: {hex_of((red, green, blue))}" in kept.rule
+
+
+def test_a_paint_to_keep_has_its_tones() -> None:
+    pictures = _drawn(3)[0]
+    palette = extract_palette(pictures)
+    least = palette.colors[-1]
+    kept = extract_palette(pictures, PaletteOptions(keep=hex_of(least.rgb), max_colors=2))
+    assert [color.rgb for color in kept.colors] == [palette.colors[0].rgb, least.rgb]
+    assert [color.tones for color in kept.colors] == [palette.colors[0].tones, least.tones]
+
+
+@pytest.mark.parametrize("share", [0.0, 0.05])
+def test_a_paint_whose_tones_are_all_kept_has_no_steps(share: float) -> None:
+    pictures = _drawn(3)[0]
+    own = extract_palette(pictures).colors[0]
+    keep = ",".join(hex_of(tone.rgb) for tone in own.tones)
+    kept = extract_palette(pictures, PaletteOptions(keep=keep, min_share=share))
+    assert kept.stepped
+    single = {color.rgb for color in kept.colors if len(color.tones) == 1}
+    assert single == {tone.rgb for tone in own.tones}
+
+
+@pytest.mark.parametrize("most", [1, 2, 3, 4])
+def test_the_largest_paints_are_kept_with_their_tones(most: int) -> None:
+    palette, _ = _palette(3)
+    found = extract_palette(_drawn(3)[0], PaletteOptions(max_colors=most))
+    assert found.stepped
+    assert [color.rgb for color in found.colors] == [c.rgb for c in palette.colors[:most]]
+    assert [color.tones for color in found.colors] == [c.tones for c in palette.colors[:most]]
+    assert ("at most" in found.rule, "kept" in found.rule) == (True, False)
+
+
+@pytest.mark.parametrize("share", [0.25, 0.3])
+def test_shades_of_paints_that_are_left_out_are_no_features(share: float) -> None:
+    palette, _ = _palette(3)
+    found = extract_palette(_drawn(3)[0], PaletteOptions(min_share=share))
+    assert found.colors == tuple(color for color in palette.colors if color.share >= share)
+    assert found.features == ()
+
+
+def test_where_no_paint_has_steps_the_palette_has_none() -> None:
+    assert not extract_palette(_drawn(3)[0], PaletteOptions(min_share=1.0)).stepped
+
+
+def test_printed_paints_stay_in_their_order_and_have_their_tones() -> None:
+    pictures = [picture.copy() for picture in _drawn(3)[0]]
+    yellow = (250, 220, 40)
+    for picture in pictures:
+        picture[110:116, 80:88, :3] = yellow
+    lights = [(round(r), round(g), round(b)) for r, g, b in PAINTS.tolist()]
+    printed = (lights[3], yellow, lights[1], lights[2], lights[0])
+    options = PaletteOptions(features=False)
+    found = choose_palette(pictures, find_contours(pictures), options, printed)
+    assert found.stepped
+    assert found.printed == printed
+    assert tuple(color.rgb for color in found.colors) == printed
+    assert [len(color.tones) for color in found.colors] == [3, 1, 3, 3, 3]
+
+
+def test_tones_of_grainy_drawings_are_read_as_they_are_drawn() -> None:
+    rng = np.random.default_rng(0)
+    pictures = []
+    for picture in _drawn(3)[0]:
+        noisy = picture[..., :3] + rng.normal(0, 7, (*picture.shape[:2], 1))
+        rgb = np.rint(noisy).clip(0, 255).astype(np.uint8)
+        pictures.append(np.dstack([rgb, picture[..., 3]]))
+    truth, _ = _palette(3)
+    found = extract_palette(pictures)
+    assert found.stepped
+    for own in truth.colors:
+        near = min(found.colors, key=lambda c: np.abs(np.subtract(c.rgb, own.rgb)).sum())
+        assert len(near.tones) == 3
+        for one, other in zip(near.tones, own.tones, strict=True):
+            assert np.abs(np.subtract(one.rgb, other.rgb)).max() <= 3
 
 
 def test_recolouring_turns_all_tones_and_keeps_their_order_and_contrast() -> None:
@@ -184,4 +266,15 @@ def test_all_paints_have_as_many_tones_in_tables() -> None:
 
 def test_colours_without_a_shade_among_them_are_not_looked_at() -> None:
     colors = np.array([(200, 30, 30), (30, 200, 30), (30, 30, 200)], np.uint8)
-    assert find_steps([], [], colors) == []
+    for some in (colors, colors[:1], colors[:0]):
+        assert find_steps([], [], some) == []
+
+
+def test_no_two_colours_are_each_others_shade() -> None:
+    rng = np.random.default_rng(0)
+    colors = rng.integers(0, 256, (600, 3)).astype(np.uint8)
+    colors[::2, rng.integers(0, 3, 300)] //= 12
+    shade = _darker(colors, np.log(colors / 255 + FLOOR))
+    order = np.log(colors / 255 + FLOOR).mean(axis=-1)
+    assert shade.any()
+    assert (order[None, :] > order[:, None])[shade].all()
