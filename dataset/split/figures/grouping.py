@@ -190,7 +190,8 @@ def _is_part(blobs: Blobs, number: int, body: int, gap: float, rgb: np.ndarray) 
         return False
     middle = own[0] + own[2] / 2
     above = main[0] <= middle <= main[0] + main[2]
-    if not above and area > HAND and gap > TOUCHING * main[3]:
+    aside = own[0] >= main[0] + main[2] or own[0] + own[2] <= main[0]
+    if aside and area > HAND and gap > TOUCHING * main[3]:
         return False
     lettering = _is_lettering(blobs, number, body, rgb)
     below = own[1] >= main[1] + main[3]
