@@ -24,6 +24,8 @@ HEXES = ("#c82828", "#2850c8", "#f0dc3c")
 VERDICTS = ("ok", "weak", "ambiguous")
 HOSTILE = "</script><script>alert('x')</script>\"'\u202e\u05d0\u05d1" + "y" * 10_000
 
+AFTER_LAYOUT = "() => new Promise(done => requestAnimationFrame(() => setTimeout(done)))"
+
 
 def sheet_png() -> bytes:
     width, height = SIZE_WH
@@ -135,6 +137,7 @@ class Editor:
 
     def mode(self, name: str) -> None:
         self.page.get_by_role("radio", name=name, exact=True).check(force=True)
+        self.page.evaluate(AFTER_LAYOUT)  # other tools move the sheet
 
     def click(self, name: str) -> None:
         self.page.locator("button:visible").get_by_text(name, exact=True).first.click()
