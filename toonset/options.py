@@ -113,7 +113,9 @@ def described(options: AnyClass) -> AnyClass:
     options.__option_fields__ = read  # type: ignore[attr-defined]
     rows = "\n".join(f"    {one.name}: {_row(one)}" for one in read)
     options.__doc__ = f"{inspect.getdoc(options) or ''}\n\nAttributes:\n{rows}\n"
-    plain = {name: get_args(hint)[0] if _is_said(hint) else hint for name, hint in hints.items()}
+    plain = {
+        name: get_args(hint)[0] if _is_annotated(hint) else hint for name, hint in hints.items()
+    }
     vars(options)["__init__"].__annotations__ = plain  # what a notebook shows of the call
     return options
 
@@ -131,7 +133,7 @@ def is_described(options: Any) -> bool:
 
 def _read(options: Any, hints: Mapping[str, Any]) -> Iterator[OptionField]:
     for field in fields(options):
-        kind, *said = get_args(hints[field.name]) if _is_said(hints[field.name]) else (None,)
+        kind, *said = get_args(hints[field.name]) if _is_annotated(hints[field.name]) else (None,)
         for option in said:
             if isinstance(option, Option):
                 kinds = get_args(kind) if get_origin(kind) in (Union, UnionType) else (kind,)
@@ -142,7 +144,7 @@ def _read(options: Any, hints: Mapping[str, Any]) -> Iterator[OptionField]:
                 yield OptionField(field, tuple(members), is_optional, is_tuple, option)
 
 
-def _is_said(hint: Any) -> bool:
+def _is_annotated(hint: Any) -> bool:
     return get_origin(hint) is Annotated
 
 

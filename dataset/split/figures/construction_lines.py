@@ -14,7 +14,7 @@ from toonset.dataset.split.figures.blobs import Blobs, find_blobs
 from toonset.dataset.split.figures.open_outlines import LINE
 from toonset.raster import dilate, wider_than
 
-LONG = 0.08  # of the figure's height: shorter ends are hair, claws, folds
+LONG = 0.12  # of the figure's height: shorter ends are hair, claws, folds
 STRAIGHT = 0.015  # of the same: a line leaves its row or column by no more
 FULL = 0.6  # of its length that is drawn
 

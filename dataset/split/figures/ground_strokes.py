@@ -1,8 +1,8 @@
 """Find ground that is sketched under the figures: hatching, dry strokes, a wash, a spray of dots.
 
-Unlike a soft shadow it has a texture and any colour, ink's as well. It is told from feet by where
-it lies: flat in the lowest rows of its figure, beside and below feet that are broader than a
-stroke, under most figures of the sheet.
+Unlike a soft shadow it has a texture, and any colour. What tells it from feet is where it lies:
+flat in the lowest rows of its figure, beside and below feet that are broader than a stroke, and
+under most figures of the sheet.
 """
 
 from __future__ import annotations
@@ -26,29 +26,60 @@ SCATTERED = 4  # strokes away from the feet: a tail, a staff's tip and toes are 
 BROAD = 0.2  # of the height, a wash under the feet: a pale shoe is shorter
 
 
+Mask = Bool[np.ndarray, "height width"]
+
+
 @dataclass(frozen=True, eq=False)
-class Ground:
+class _Ground:
     """What may be sketched ground under one figure.
 
     Attributes:
         mask: its pixels.
-        spread: its columns away from the feet, of the figure's height.
-        strokes: how many lie away from the feet.
-        broad: width of its widest wash, of the figure's height.
+        spread: its columns away from the feet, as a share of the figure's height.
+        strokes: how many of its pieces away from the feet are as thin as strokes.
+        broad: width of its widest wash, as a share of the figure's height.
     """
 
-    mask: Bool[np.ndarray, "height width"]
+    mask: Mask
     spread: float = 0.0
     strokes: int = 0
     broad: float = 0.0
 
 
+@dataclass(frozen=True, eq=False)
+class _Surroundings:
+    """The lowest rows of a figure, and what lies beside them.
+
+    Attributes:
+        own: the figure with what it encloses.
+        paint: of it and of patches beside it.
+        contrast: levels between every pixel and the background.
+        tall: the figure's height.
+    """
+
+    own: Mask
+    paint: Mask
+    contrast: UInt8[np.ndarray, "height width"]
+    tall: int
+
+    @property
+    def stroke(self) -> int:
+        """Return half of a stroke's width in pixels."""
+        return max(1, round(STROKE * self.tall))
+
+    def lowest(self, share: float) -> Mask:
+        """Return the figure's lowest rows up to a share of its height, and all below."""
+        last = int(np.flatnonzero(self.own.any(axis=1))[-1])
+        above = last - np.arange(len(self.own))[:, None]
+        return np.broadcast_to(above <= max(1, share * self.tall), self.own.shape)
+
+
 def find_ground_strokes(
     blobs: Blobs,
     main_blobs: Int[np.ndarray, " main_blobs"],
-    painted: Bool[np.ndarray, "height width"],
+    painted: Mask,
     contrast: UInt8[np.ndarray, "height width"],
-) -> Bool[np.ndarray, "height width"]:
+) -> Mask:
     """Return the pixels of sketched ground; none unless most of the figures stand on some.
 
     Args:
@@ -64,7 +95,9 @@ def find_ground_strokes(
         window = _around_the_feet(blobs.boxes[number], painted.shape)
         own = blobs.labels[window] == number + 1
         paint = painted[window] & (own | ~bodies[window])
-        ground = _ground_of(own, paint, contrast[window], int(blobs.boxes[number, 3]))
+        ground = _ground_of(
+            _Surroundings(own, paint, contrast[window], int(blobs.boxes[number, 3]))
+        )
         found[window] |= ground.mask
         each.append((ground.spread, ground.strokes, ground.broad))
     spread, strokes, broad = np.median(each, axis=0)
@@ -81,59 +114,63 @@ def _around_the_feet(box: np.ndarray, shape: tuple[int, ...]) -> tuple[slice, sl
     )
 
 
-def _ground_of(
-    own: Bool[np.ndarray, "height width"],
-    paint: Bool[np.ndarray, "height width"],
-    contrast: UInt8[np.ndarray, "height width"],
-    tall: int,
-) -> Ground:
-    """Return what lies under and beside one figure's feet.
-
-    Args:
-        own: the figure with what it encloses.
-        paint: of it and of patches beside it.
-        contrast: levels between every pixel and the background.
-        tall: the figure's height.
-    """
-    if not own.any():
-        return Ground(np.zeros_like(own))
-    lowest = int(np.flatnonzero(own.any(axis=1))[-1])
-    above = np.broadcast_to(lowest - np.arange(len(own))[:, None], own.shape)
-    low, flat, room = (above <= max(1, share * tall) for share in (BAND, FLAT, WASH))
-    if not (own & low & paint).any() or not (own & ~room).any():
-        return Ground(np.zeros_like(own))
-    by = max(1, round(STROKE * tall))
-    pale = contrast < PALE * np.percentile(contrast[own & low & paint], 90)
-    wash = connected_to(dilate(~own & ~paint) & low, room & pale & paint)
-    wash &= ~connected_to(dilate(wider_than(own & pale & paint, by) & ~room), wash, 8)
-    wash &= parts_mostly_in(wash, low)
-    enclosed = own & ~paint
-    enclosed &= ~(flat & connected_to(~low, enclosed, 8))  # between the legs
-    broad = find_blobs(wider_than((paint & ~wash) | enclosed, by))
-    is_foot = broad.boxes[:, 3] >= FLAT * tall
-    is_foot[np.unique(broad.labels[~low & own & (broad.labels > 0)]) - 1] = True
-    feet = np.append(False, is_foot)[broad.labels]
+def _ground_of(seen: _Surroundings) -> _Ground:
+    """Return what lies under and beside one figure's feet."""
+    nothing = _Ground(np.zeros_like(seen.own))
+    if not seen.own.any():
+        return nothing
+    low, stroke = seen.lowest(BAND), seen.stroke
+    if not (seen.own & low & seen.paint).any() or not (seen.own & ~seen.lowest(WASH)).any():
+        return nothing
+    wash = _wash(seen)
+    feet = _feet(seen, wash)
     if not (feet & low).any():
-        return Ground(np.zeros_like(own))
-    strokes = low & paint & ~dilate(feet, by) & ~wash
-    ground = wash | (strokes & ~connected_to(dilate(own & paint & ~low), strokes, 8))  # a fringe
-    away = ground & (distance_to(feet) > 2 * by)
+        return nothing
+    strokes = low & seen.paint & ~dilate(feet, stroke) & ~wash
+    fringe = connected_to(dilate(seen.own & seen.paint & ~low), strokes, 8)
+    bottom = int(np.flatnonzero(feet.any(axis=1))[-1]) + stroke
+    ground = _starting_above(bottom, wash | (strokes & ~fringe))  # lower down are letters
+    away = _starting_above(bottom, ground & (distance_to(feet) > 2 * stroke))
     pieces = find_blobs(away)
-    bottom = int(np.flatnonzero(feet.any(axis=1))[-1])
-    beside = pieces.boxes[:, 1] <= bottom + by  # lower ones are letters
-    away &= np.append(False, beside)[pieces.labels]
-    counted = np.ones(len(beside) + 1, dtype=bool)
-    counted[np.unique(pieces.labels[wider_than(away, by)])] = False
-    count = int((beside & counted[1:]).sum())
-    below = find_blobs(ground)
-    ground &= np.append(False, below.boxes[:, 1] <= bottom + by)[below.labels]
+    thick = np.unique(pieces.labels[wider_than(away, stroke)])
+    thin = len(pieces.areas) - np.count_nonzero(thick)
     widest = find_blobs(wash).boxes[:, 2].max(initial=0) * _on_both_sides(wash, feet & low)
-    return Ground(ground, float(away.any(axis=0).sum()) / tall, count, float(widest) / tall)
+    spread = np.count_nonzero(away.any(axis=0))
+    return _Ground(ground, spread / seen.tall, int(thin), float(widest) / seen.tall)
 
 
-def _on_both_sides(
-    wash: Bool[np.ndarray, "height width"], feet: Bool[np.ndarray, "height width"]
-) -> bool:
+def _wash(seen: _Surroundings) -> Mask:
+    """Return pale paint at the feet that no line divides from the paper: a wash, dry strokes.
+
+    What is pale above as well is cloth, and so is what lies above the strokes.
+    """
+    low, room = seen.lowest(BAND), seen.lowest(WASH)
+    feet = seen.contrast[seen.own & low & seen.paint]
+    pale = (seen.contrast < PALE * np.percentile(feet, 90)) & seen.paint
+    wash = connected_to(dilate(~seen.own & ~seen.paint) & low, room & pale)
+    cloth = wider_than(seen.own & pale, seen.stroke) & ~room
+    return parts_mostly_in(wash & ~connected_to(dilate(cloth), wash, 8), low)
+
+
+def _feet(seen: _Surroundings, wash: Mask) -> Mask:
+    """Return the parts of a figure that are broader than a stroke, and higher or no ground's."""
+    low = seen.lowest(BAND)
+    enclosed = seen.own & ~seen.paint
+    enclosed &= ~(seen.lowest(FLAT) & connected_to(~low, enclosed, 8))  # between the legs
+    broad = find_blobs(wider_than((seen.paint & ~wash) | enclosed, seen.stroke))
+    is_foot = np.append(False, broad.boxes[:, 3] >= FLAT * seen.tall)
+    is_foot[np.unique(broad.labels[~low & seen.own])] = True
+    is_foot[0] = False
+    return is_foot[broad.labels]
+
+
+def _starting_above(row: int, mask: Mask) -> Mask:
+    """Return the parts of a mask that do not begin below a row."""
+    pieces = find_blobs(mask)
+    return np.append(False, pieces.boxes[:, 1] <= row)[pieces.labels]
+
+
+def _on_both_sides(wash: Mask, feet: Mask) -> bool:
     """Return whether a wash reaches farther left and right than the feet; a tail does not."""
     if not wash.any():
         return False

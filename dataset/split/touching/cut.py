@@ -103,16 +103,16 @@ def part_touching(
     """
     parted, cuts = _part_all(blobs, main_blobs, main_blobs, painted, rgb)
     in_two = {cut.box for cut in cuts if cut.made and cut.study is None}
-    whole = _wholes(blobs, main_blobs, in_two)
-    if len(whole):
-        able = np.setdiff1d(main_blobs, whole)
-        parted, cuts = _part_all(blobs, main_blobs, able, painted, rgb)
+    mistaken = _cut_by_mistake(blobs, main_blobs, in_two)
+    if len(mistaken):
+        others = np.setdiff1d(main_blobs, mistaken)
+        parted, cuts = _part_all(blobs, main_blobs, others, painted, rgb)
     return parted, cuts
 
 
-def _wholes(
+def _cut_by_mistake(
     blobs: Blobs, main_blobs: Int[np.ndarray, " main_blobs"], cut: set[Box]
-) -> Int[np.ndarray, " wholes"]:
+) -> Int[np.ndarray, " mistaken"]:
     """Return the patches that were cut although one that was not cut has the same outline.
 
     Both are one figure, such as a broad one that is symmetric, from the front and from behind.
@@ -132,16 +132,16 @@ def _wholes(
 def _part_all(
     blobs: Blobs,
     main_blobs: Int[np.ndarray, " main_blobs"],
-    able: Int[np.ndarray, " able"],
+    candidates: Int[np.ndarray, " candidates"],
     painted: Bool[np.ndarray, "height width"],
     rgb: UInt8[np.ndarray, "height width 3"],
 ) -> tuple[Blobs, list[Cut]]:
-    """Return `part_touching` of the patches that are able to be several figures."""
+    """Return what `part_touching` does, of the candidates alone."""
     cuts = list[Cut]()
     patches = _Patches(blobs.labels.copy(), painted, rgb, {}, {})
     for number in main_blobs:
         patches.measure(int(number) + 1, blobs.window(int(number)))
-    queue, top = [int(number) + 1 for number in able], len(blobs.areas)
+    queue, top = [int(number) + 1 for number in candidates], len(blobs.areas)
     while queue:
         label = queue.pop()
         box = patches.boxes[label]

@@ -246,3 +246,15 @@ def test_rows_that_a_person_did_not_choose_are_no_views_left_out(seed: int) -> N
     assert whole.groups[0].outfits
     row = split_picture(messy.rgba, PictureOptions(taken=Taken(0, 1)))
     assert not any("was left out" in line for line in row.warnings)
+
+
+def test_a_strip_of_colours_in_the_reach_of_a_tail_is_no_part() -> None:
+    page = sheet_of(figure(280, (200, 40, 40)), figure(280, (200, 40, 40)))
+    page = np.concatenate([np.full((len(page), 150, 4), 255, np.uint8), page], axis=1)
+    page[300:320, 40:240, :3] = (200, 40, 40)  # a tail
+    page[80:270, 150:178, :3] = (90, 200, 40)
+    sheet = split_picture(page)
+    assert len(sheet.views) == 2
+    x, y, width, height = 150, 80, 28, 190
+    left, top, _, _ = sheet.views[0].box
+    assert not sheet.views[0].mask[y - top : y - top + height, x - left : x - left + width].any()
