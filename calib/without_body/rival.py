@@ -46,11 +46,12 @@ def with_body_or_without(
 ) -> tuple[Calibration, bool]:
     """Return the calibration that explains the drawings better, and whether it has no body.
 
-    A body that explains nothing loses to drawings that cohere; else paint, faces, detail, outlines
-    and layout decide. A mannequin that somebody gave loses where the drawings alone are right with
-    the probability `thresholds.sure`; one that stays though every view is certain without it says
-    so. Nothing is tried where the mannequin's cameras are certain, or, where somebody put it on a
-    view, not failed; nor where landmarks, cameras or locks of the whole sheet belong to it.
+    A body that explains nothing loses to drawings that cohere, the default one also to drawings
+    with a better verdict; else paint, faces, detail, outlines and layout decide. A mannequin that
+    somebody gave loses where the drawings alone are right with the probability `thresholds.sure`;
+    one that stays though every view is certain without it says so. Nothing is tried where the
+    mannequin's cameras are certain, or, where somebody put it on a view, not failed; nor where
+    landmarks, cameras or locks of the whole sheet belong to it.
 
     Args:
         views: the drawings.
@@ -69,6 +70,8 @@ def with_body_or_without(
     alone = alone or calibrate_without_body(views, known, tell, cues, options)
     if found.verdict == "failed":
         worse = alone.verdict == "failed"
+    elif not given and alone.doubtfulness < found.doubtfulness:
+        worse = False
     else:
         least = logit(options.thresholds.sure) if given else 0.0
         worse = _odds(cues, alone, found, known) <= least

@@ -19,8 +19,8 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.camera import Camera
 from toonset.nerf.hull.mannequin_shape import FINER, Shape, ShapeView
-from toonset.nerf.look.border_lines import Unlined, missing_lines, missing_steps
-from toonset.nerf.look.choose import OTHER, Look, choose, filled_from, mixed, shared_groups
+from toonset.nerf.look.borders import Unlined, missing_lines, missing_steps, settled
+from toonset.nerf.look.choose import OTHER, Look, choose, filled_from, joints, mixed, shared_groups
 from toonset.nerf.look.drawings import (
     CRUMB,
     STEP,
@@ -269,6 +269,9 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
     if not shown.any():  # as if the body were of glass
         color, labels = mixed(looks, np.zeros_like(chosen), counts)
     color, labels = _extended(kept, color, labels, pen)
+    if sight is None:
+        meeting = joints(looks, np.where(kept, chosen, -1))
+        color, labels = settled(color, labels, meeting, alpha > 0, pen, figure_px)
     stepped = sight is None and drawings.steps_hold
     if line is not None and (stepped or len(drawings.lined_pairs)):
         unlined = _unlined(looks, np.where(kept, chosen, -1), alpha > SOLID, figure_px)

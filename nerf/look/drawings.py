@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float, Float16, Shaped, UInt8, UInt16
 from toonset.camera import Camera
 from toonset.dataset.silhouettes.mask import mask_of
 from toonset.nerf.hull.mannequin_shape import Shape
-from toonset.nerf.look.border_lines import Unlined, lined_pairs
+from toonset.nerf.look.borders import Unlined, lined_pairs
 from toonset.nerf.look.features import Features, features_of
 from toonset.nerf.look.outline import Outline, without_crumbs
 from toonset.nerf.look.paint_labels import paint_labels, repainted

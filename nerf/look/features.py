@@ -144,12 +144,15 @@ def features_of(
     )
 
 
-def lines_of(picture: Picture, pen: tuple[float, tuple[int, int, int]] | None) -> Mask:
-    """Return the pixels of a picture in which a pen's lines are, and beside them.
+def lines_of(
+    picture: Picture, pen: tuple[float, tuple[int, int, int]] | None, *, beside: bool = True
+) -> Mask:
+    """Return the pixels of a picture in which a pen's lines are.
 
     Args:
         picture: in [0, 1].
         pen: width in pixels and colour; None: there are no lines.
+        beside: those beside them, too.
     """
     lined = np.zeros(picture.shape[:2], dtype=bool)
     if pen:
@@ -158,7 +161,8 @@ def lines_of(picture: Picture, pen: tuple[float, tuple[int, int, int]] | None) -
         for channel, level in zip(cv2.split(picture), rgb, strict=True):
             inky &= np.abs(channel * 255 - np.float32(level)) < INK_LIKE
         thick = depth_inside(inky) > THICK * width  # is paint
-        lined = dilate(inky & (distance_to(thick) > (THICK + 1) * width if thick.any() else True))
+        lined = inky & (distance_to(thick) > (THICK + 1) * width if thick.any() else True)
+        lined = dilate(lined) if beside else lined
     return lined
 
 

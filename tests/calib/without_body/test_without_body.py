@@ -213,7 +213,10 @@ def test_a_given_mannequin_in_doubt_yields_to_drawings_that_are_clearly_likelier
     better, has_no_body = ask(found, given=True)
     assert has_no_body == (nats > 3)
     assert better.reason == (REFUSED if has_no_body else f"{ASK_ALONE}; 1 of 4 weak")
-    assert ask(found, given=False) == ((alone, True) if nats > 0 else (found, False))
+    assert ask(found, given=False) == (alone, True)  # nobody chose it, and it is in doubt
+    doubted = replace(alone, verdict="weak")
+    asked = ask(found, given=False, alone=doubted)
+    assert asked == ((doubted, True) if nats > 0 else (found, False))
     assert ask(alone, given=True) == (alone, False)  # certain: nothing is asked
 
 

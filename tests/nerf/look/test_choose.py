@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from toonset.nerf.look.blend import _afloat
-from toonset.nerf.look.choose import Look, choose, shared_groups
+from toonset.nerf.look.choose import JUMP_PX, Look, choose, joints, shared_groups
 
 SIZE = 120
 Y, X = (axis.astype(np.float32) for axis in np.mgrid[:SIZE, :SIZE])
@@ -88,3 +88,16 @@ def test_the_face_that_is_stretched_less_leads() -> None:
 @pytest.mark.parametrize("middles", [(30, 90), (42, 78)])
 def test_faces_apart_or_just_touching_are_nobodys_business(middles: tuple[int, int]) -> None:
     assert shared_groups([face_at(0.5, middle) for middle in middles]) == []
+
+
+def test_joints_are_where_neighbours_show_other_drawings_or_other_places() -> None:
+    paint = np.full((*INSIDE.shape, 3), 0.6, np.float32)
+    looks = [look_at(paint, 0.5), look_at(paint, 0.5)]
+    chosen = np.where(X < 60, 0, 1)
+    assert np.flatnonzero(joints(looks, chosen).any(axis=0)).tolist() == [59, 60]
+    assert not joints(looks, np.zeros_like(chosen)).any()
+    folded = X + np.float32(2 * JUMP_PX) * (Y > 30)
+    step = Look(looks[0].texture, folded, Y, INSIDE, 1.0, 1.0)
+    assert np.flatnonzero(joints([step], np.zeros_like(chosen)).any(axis=1)).tolist() == [30, 31]
+    finer = Look(looks[0].texture, folded, Y, INSIDE, 1.0, 0.4)  # of a pixel of the view
+    assert not joints([finer], np.zeros_like(chosen)).any()

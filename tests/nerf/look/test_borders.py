@@ -7,12 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from toonset.nerf.look.border_lines import Unlined, lined_pairs, missing_lines, missing_steps
+from toonset.nerf.look.borders import Unlined, lined_pairs, missing_lines, missing_steps, settled
 
 SIZE, INK = 100, (10, 10, 10)
 INSIDE = np.ones((SIZE, SIZE), bool)
 PAINTS = np.array([(200, 60, 60), (60, 200, 60), (60, 60, 200)], np.uint8)
 PEN = 3.0
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(0)
 
 
 def unlined_of(gap: slice = slice(0), ink: tuple[int, int, int] = INK) -> Unlined:
@@ -100,3 +105,51 @@ def test_a_line_goes_on_where_no_drawing_shows_the_step() -> None:
     assert missing_steps(torn, depth, 1.0, PEN)[47:53].sum() == 0
     cover = missing_steps(torn.extended(INSIDE), depth, 1.0, PEN)
     assert cover[10:90].sum(axis=1) == pytest.approx(PEN, abs=0.8)
+
+
+def ragged(rng: np.random.Generator, size: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return paint 0 above paint 1, their border ragged by up to two pixels, and its labels."""
+    steps = size // 2 + rng.integers(-2, 3, size)
+    labels = (np.arange(size)[:, None] >= steps).astype(np.uint8)
+    return PAINTS[labels] / np.float32(255), labels
+
+
+def test_a_ragged_border_is_smooth_and_soft_by_a_pixel(rng: np.random.Generator) -> None:
+    size = 400
+    color, labels = ragged(rng, size)
+    inside = np.ones((size, size), bool)
+    joints = np.zeros_like(inside)
+    joints[size // 2 - 3 : size // 2 + 3] = True
+    shown, names = settled(color, labels, joints, inside, None, 400.0)
+    heights = names.argmax(axis=0)[20:-20]
+    assert np.abs(np.diff(heights)).mean() < np.abs(np.diff(labels.argmax(axis=0))).mean() / 4
+    assert np.abs(heights - size // 2).max() <= 2
+    between = np.abs(shown - color[0, 0]).max(axis=-1) * np.abs(shown - color[-1, 0]).max(axis=-1)
+    assert 0.5 < (between[:, 20:-20] > 0.01).sum(axis=0).mean() < 3
+    far = np.abs(np.arange(size) - size // 2) > 12
+    np.testing.assert_array_equal(shown[far], color[far])
+    np.testing.assert_array_equal(names[far], labels[far])
+
+
+def test_lines_and_texture_at_a_joint_stay(rng: np.random.Generator) -> None:
+    size = 300
+    labels = np.zeros((size, size), np.uint8)
+    color = np.broadcast_to(PAINTS[0] / np.float32(255), (size, size, 3)).copy()
+    color += rng.normal(0, 0.02, (size, size, 1)).astype(np.float32)
+    color[:, 149:151] = np.array(INK) / 255
+    joints = np.zeros((size, size), bool)
+    joints[150] = True
+    pen = (2.0, INK)
+    shown, _ = settled(color, labels, joints, np.ones_like(joints), pen, 300.0)
+    dark = (shown < 0.2).all(axis=-1)
+    assert dark[:, 149:151].all()
+    np.testing.assert_array_equal(shown[:, :140], color[:, :140])
+
+
+def test_without_joints_or_a_figure_nothing_is_settled(rng: np.random.Generator) -> None:
+    color, labels = ragged(rng, 50)
+    nothing, everything = np.zeros((50, 50), bool), np.ones((50, 50), bool)
+    for joints, inside in ((nothing, everything), (everything, nothing)):
+        shown, names = settled(color, labels, joints, inside, None, 50.0)
+        assert shown is color
+        assert names is labels
