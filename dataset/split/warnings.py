@@ -29,9 +29,10 @@ IN_EACH_OTHER = 0.45  # of the smaller one's box
 LEAST_SHADOW = 0.02  # of the height: so much lower than its row
 SHADED = 0.9  # of what is lower: it is shadow
 AS_LIKELY = 0.6  # of the merit of the group that was taken: another may be the turnaround
-EVEN = 0.85  # of the other's height: two views of one figure differ by less
+EVEN = 0.85  # of the others' height: views of one figure differ by less
 UPRIGHT = 1.4  # times its width: a standing figure is higher, a head is not
 SMALL = 0.25  # of a single view's height: small whole figures beside it may be the turnaround
+FEET, LEAST_FOOT = 0.05, 1e-4  # of a figure's height, its lowest; squared: feet
 WHOLE = 0.6  # of the sheet that one view's box covers though there is text beside it
 WIDE_GAP = 0.05  # of the figure's height: a wider gap may be meant
 LARGE_POCKET = 0.01  # of the figure's squared height: so much more or less changes it
@@ -147,7 +148,7 @@ def figure_warnings(
         *_wide_views(views),
         *_two_heads(views),
         *_off_row(views),
-        *_uneven_pair(views),
+        *_uneven(views),
         *_one_in_another(views),
         *_whole_page(found, views, rgba),
         *_panels(views, rgba),
@@ -289,17 +290,19 @@ def _off_row(views: list[View]) -> list[str]:
     return said
 
 
-def _uneven_pair(views: list[View]) -> list[str]:
-    """Return a line if there are two views and one is much lower: no row tells which is right."""
-    if len(views) != 2:
+def _uneven(views: list[View]) -> list[str]:
+    """Return a line if one view is much lower than all others: a part, a study, another figure."""
+    if len(views) < 2:
         return []
-    low, high = sorted(views, key=lambda view: view.figure_box[3])
-    share = low.figure_box[3] / high.figure_box[3]
-    if share >= EVEN:
+    low, *others = sorted(views, key=lambda view: view.figure_box[3])
+    least, usual = others[0].figure_box[3], np.median([view.figure_box[3] for view in others])
+    share = low.figure_box[3] / usual
+    if share >= EVEN or least < EVEN * usual:
         return []
+    whom = others[0].name if len(others) == 1 else "the others"
     return [
-        f"view {low.name} is {100 * share:.0f} % as high as {high.name}: are both whole figures of "
-        "one character?"
+        f"view {low.name} is {100 * share:.0f} % as high as {whom}: are all whole figures of one "
+        "character?"
     ]
 
 
@@ -331,15 +334,29 @@ def _beside_row(top: int, height: int, views: list[View]) -> tuple[float, float]
 
 
 def _whole_page(found: SheetLayout, views: list[View], rgba: np.ndarray) -> list[str]:
-    """Return a line if the only view may be a panel with all that is on it."""
+    """Return a line if the only view may be a panel with all that is on it, or several figures."""
     _, _, width, height = views[0].figure_box
     covered = width * height >= WHOLE * rgba.shape[0] * rgba.shape[1]
-    if len(views) > 1 or not covered or "text" not in found.grouping.kinds:
+    if len(views) > 1 or not covered:
+        return []
+    if "text" in found.grouping.kinds:
+        beside = ", with text beside it"
+    elif height < UPRIGHT * width and _stands_on(views[0]) > 2:
+        beside = " and stands on many feet"
+    else:
         return []
     return [
-        f"view {views[0].name} is most of the sheet, with text beside it: does it hold more than "
+        f"view {views[0].name} is most of the sheet{beside}: does it hold more than "
         "one figure? crop the sheet to the figures, or give them with --boxes"
     ]
+
+
+def _stands_on(view: View) -> int:
+    """Return in how many parts a figure stands."""
+    left, top, width, height = view.figure_box
+    x, y, low = left - view.box[0], top - view.box[1], max(1, round(FEET * height))
+    _, areas = sized_parts(view.mask[y + height - low : y + height, x : x + width])
+    return int((areas[1:] > LEAST_FOOT * height**2).sum())
 
 
 def _panels(views: list[View], rgba: np.ndarray) -> list[str]:

@@ -159,6 +159,28 @@ def test_two_views_of_which_one_is_much_lower_are_doubted() -> None:
         assert any("as high as" in line for line in sheet.warnings) is doubted
 
 
+def test_one_of_several_views_that_is_much_lower_is_doubted_but_not_rows_of_all_heights() -> None:
+    heights = {(280, 278, 225): True, (280, 278, 262): False, (290, 222, 222): False}
+    for tall, doubted in heights.items():
+        sheet = split_picture(sheet_of(*[figure(height, (200, 40, 40)) for height in tall]))
+        assert len(sheet.views) == len(tall)
+        assert any("as high as the others" in line for line in sheet.warnings) is doubted
+
+
+def test_figures_that_overlap_all_over_the_sheet_are_doubted_and_a_wide_figure_is_not() -> None:
+    page = np.full((320, 300, 4), 255, np.uint8)
+    page[24:304, 20:132, :3] = figure(280, (200, 40, 40))
+    one = page.copy()
+    for x in (94, 168):
+        drawn = figure(280, (200, 40, 40))
+        page[24:304, x : x + 112, :3] = np.minimum(page[24:304, x : x + 112, :3], drawn)
+    cv2.rectangle(page, (60, 120), (240, 150), (90, 60, 200, 255), -1)
+    cv2.rectangle(one, (10, 120), (260, 140), (200, 40, 40, 255), -1)
+    for sheet, doubted in ((split_picture(page), True), (split_picture(one), False)):
+        assert len(sheet.views) == 1
+        assert any("many feet" in line for line in sheet.warnings) is doubted
+
+
 def test_small_whole_figures_beside_a_single_large_one_may_be_the_turnaround() -> None:
     small = [cv2.resize(figure(280, (200, 40, 40)), (44, 110)) for _ in range(2)]
     sheet = split_picture(sheet_of(figure(290, (200, 40, 40)), *small))
