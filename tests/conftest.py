@@ -14,12 +14,13 @@ import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
 from threadpoolctl import threadpool_limits
+
+from lab.contents import contents
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -32,7 +33,7 @@ threadpool_limits(1, user_api="blas")  # of those that are loaded already
 os.environ["OMP_WAIT_POLICY"] = "PASSIVE"
 
 VIEWS, CELL, SEED = 5, 120, 11
-MAINS = {"toonset": "toonset.cli.main", "bench": "bench.__main__"}
+MAINS = {"toonset": "toonset.cli.main", "bench": "lab.bench.__main__"}
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -112,20 +113,6 @@ def run_and_interrupt(sign: str, folder: Path, *arguments: object) -> Outcome:
     return Outcome(process.returncode, out, err)
 
 
-def contents(folder: Path) -> dict[str, str]:
-    """Return every path below a folder with what is there: hash, link target or kind."""
-    found = {}
-    for path in sorted(folder.rglob("*")):
-        name = str(path.relative_to(folder))
-        if path.is_symlink():
-            found[name] = f"link to {os.readlink(path)}"
-        elif path.is_file():
-            found[name] = sha256(path.read_bytes()).hexdigest()
-        else:
-            found[name] = "folder" if path.is_dir() else "special"
-    return found
-
-
 @pytest.fixture(scope="session")
 def toonset() -> Command:
     """Return the command line, run in this process."""
@@ -159,7 +146,7 @@ def snapshot() -> Callable[[Path], dict[str, str]]:
 @pytest.fixture(scope="session")
 def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with a drawn sheet.png, its first figure single.png, and mannequin.obj."""
-    from bench.cases.bodies import random_body
+    from lab.bench.cases.bodies import random_body
     from toonset.dataset.images.picture import encode_png
     from toonset.dataset.mesh.load import save_obj
     from toonset.dataset.synthetic.options import SynthOptions
@@ -313,7 +300,7 @@ def calibration_report(names: list[str], cameras: list[Any]) -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
     """Yield a browser; only one can be driven at a time."""
-    from bench.view.compare import chromium
+    from lab.bench.view.compare import chromium
 
     with chromium() as browser:
         yield browser

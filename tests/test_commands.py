@@ -24,11 +24,11 @@ import trimesh
 import typer
 from typer.testing import CliRunner
 
-from bench.batch.sheets import write_sheets
-from bench.cases.bodies import random_body
-from bench.messy.sheet import make_messy_sheet
-from tests.bench.stand_ins import measure_nothing
+from lab.bench.batch.sheets import write_sheets
+from lab.bench.cases.bodies import random_body
+from lab.bench.messy.sheet import make_messy_sheet
 from tests.conftest import calibration_report
+from tests.lab.bench.stand_ins import measure_nothing
 from tests.test_documents import DOCUMENTS, text_of
 from toonset.camera import Camera
 from toonset.cli.main import VERBS
@@ -52,7 +52,7 @@ ELSEWHERE = {  # commands that do not run here, and where they do
     "./run docs": "every change runs it: .ci/run",
     "./run wheel": "every change runs it: .ci/run",
     "./run bench": "minutes to hours: `test_benches_run_as_they_stand` measures next to nothing",
-    "python -m bench": "as ./run bench",
+    "python -m lab.bench": "as ./run bench",
     "pip install": "needs a package index",
     "uv pip": "needs a package index",
     "printf": "as uv pip",
@@ -262,7 +262,7 @@ def test_no_command_is_left_out_silently() -> None:
 
 def bench_commands() -> list[str]:
     shown = {c for name in DOCUMENTS for c in commands(name) if not is_form(c)}
-    return sorted(c for c in shown if c.startswith(("./run bench", "python -m bench")))
+    return sorted(c for c in shown if c.startswith(("./run bench", "python -m lab.bench")))
 
 
 @pytest.mark.parametrize("command", bench_commands())
@@ -281,7 +281,7 @@ def test_benches_run_as_they_stand(
         app.command()(importlib.import_module(f"{module}.__main__").main)
         assert CliRunner().invoke(app, words).exit_code == 0, command
     subject = {"--check": "check", "--renew": "check"}.get((words or [""])[0], (words or [""])[0])
-    assert set(asked) <= {subject if module == "bench" else module.removeprefix("bench.")}
+    assert set(asked) <= {subject if module == "bench" else module.removeprefix("lab.bench.")}
     assert asked or words == ["palette", "--quick"]
     assert subject == "check" or len(list(tmp_path.glob("bench-results/**/*.*"))) > 1
 

@@ -39,7 +39,7 @@ def steps_of_the_demo() -> list[list[str]]:
 
 def complaint(words: list[str]) -> str:
     """Return what toonset, or the bench, would not understand in a command line; empty if fine."""
-    from bench.__main__ import app as bench
+    from lab.bench.__main__ import app as bench
     from toonset.cli.main import VERBS, app
 
     verb = next((word for word in words if not word.startswith("-")), None)

@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 # A stage imports only stages with a lower number: calib and nerf never see each other.
 LAYERS = {"palette": 1, "dataset": 2, "calib": 3, "nerf": 3, "cli": 4}
-OUTSIDE = ("bench", "tests", "examples")  # of the wheel: no stage imports them
+OUTSIDE = ("lab", "tests", "examples")  # of the wheel: no stage imports them
 
 
 # Within a stage a room imports only rooms on a lower floor; "@" marks a file of the stage's own
@@ -170,7 +170,7 @@ def folders() -> list[Path]:
 
 
 def test_folders_are_rooms_not_halls() -> None:
-    others = {path.parent for top in ("bench", "tests") for path in (ROOT / top).rglob("*.py")}
+    others = {path.parent for top in ("lab", "tests") for path in (ROOT / top).rglob("*.py")}
     for folder in {*folders(), *others}:
         assert len(list(folder.glob("*.py"))) <= MOST_FILES, folder.relative_to(ROOT)
     assert len(folders()) <= MOST_ROOMS

@@ -2,8 +2,9 @@
 
 A run is weak where a drawing and what the others make of its side are plainly apart (`left_out`),
 or where no drawing shows a side (`view_coverage`). The bound is where people would be unhappy with
-new views (docs/decisions.md, `python -m bench.verdict`). What eyes see on views between drawings is
-reported, but decides nothing: it does not tell how new views of an unknown character look.
+new views (docs/decisions.md, `python -m lab.bench.verdict`). What eyes see on views between
+drawings is reported, but decides nothing: it does not tell how new views of an unknown character
+look.
 """
 
 from __future__ import annotations

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from bench.calib.figures import view_error
-from bench.cases.bodies import random_body
+from lab.bench.calib.figures import view_error
+from lab.bench.cases.bodies import random_body
 from toonset.calib.calibrate import calibrate
 from toonset.calib.find_cameras import find_cameras
 from toonset.calib.known import Known

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.cases.bodies import random_body
+from lab.bench.cases.bodies import random_body
 from toonset.calib.calibrate import calibrate
 from toonset.calib.captions import weigh_captions
 from toonset.calib.options import Hints, VerdictThresholds

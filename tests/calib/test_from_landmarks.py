@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bench.cases.bodies import random_body
+from lab.bench.cases.bodies import random_body
 from toonset.calib.from_landmarks import calibrate_by_landmarks
 from toonset.calib.outline.occluding_contour import silhouette_mask
 from toonset.calib.result import Calibration

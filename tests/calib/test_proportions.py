@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.cases.bodies import random_body
-from bench.stability.bodies import with_arms_raised, with_head_grown
+from lab.bench.cases.bodies import random_body
+from lab.bench.stability.bodies import with_arms_raised, with_head_grown
 from toonset.calib import pipeline
 from toonset.calib.find_cameras import find_cameras
 from toonset.calib.fit.model_selection import BIC_MARGIN, PROPORTIONS, QUICK_TEST_MARGIN, ModelTest

@@ -251,7 +251,7 @@ def test_ctrl_c_leaves_nothing_behind(drawn: Path, tmp_path, interrupted, snapsh
 def test_one_process_can_draw_and_then_train():
     """Mesa's LLVM used to crash the import of Triton's, which torch's optimisers bring along."""
     program = """
-from bench.cases.bodies import random_body
+from lab.bench.cases.bodies import random_body
 from toonset.dataset.synthetic.options import SynthOptions
 from toonset.dataset.synthetic.turnaround import make_turnaround
 make_turnaround(random_body(0), SynthOptions(views=1, cell_px=32), 0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from bench.palette.cases import palette_cases, random_paints
+from lab.bench.palette.cases import palette_cases, random_paints
 from tests.palette.pictures import as_set, block, opaque, soft_stripes
 from toonset.cli.common.palette_text import palette_lines
 from toonset.palette.colors import oklab_from_rgb

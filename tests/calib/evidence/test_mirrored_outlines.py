@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bench.cases.bodies import random_body
+from lab.bench.cases.bodies import random_body
 from toonset.calib.evidence.mirrored_outlines import mirrored_log_likelihood, read_mirrored_outlines
 from toonset.dataset.synthetic.options import SynthOptions
 from toonset.dataset.synthetic.turnaround import make_turnaround

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bench.cases.bodies import random_body
+from lab.bench.cases.bodies import random_body
 from toonset.calib.fit.drawing_error import Noise
 from toonset.calib.fit.proportions import as_it_is
 from toonset.calib.fit.sheet_adjustment import JointFit

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.cases.bodies import random_body
+from lab.bench.cases.bodies import random_body
 from tests.figures import boxes
 from toonset.calib.find_cameras import find_cameras
 from toonset.calib.flaws.cropped import at_cuts, ending_at, flat_sides

@@ -7,7 +7,7 @@ from typing import cast
 import numpy as np
 import pytest
 
-from bench.cases.bodies import random_body
+from lab.bench.cases.bodies import random_body
 from toonset.calib.flaws.false_holes import fill_false_holes
 from toonset.calib.result import ViewCalibration
 from toonset.camera import Camera

@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from bench.cases.bodies import random_body
-from bench.stability.damage import stretched
+from lab.bench.cases.bodies import random_body
+from lab.bench.stability.damage import stretched
 from toonset.calib.find_cameras import find_cameras
 from toonset.calib.fit.model_selection import BIC_MARGIN, STRETCHED, TALLER
 from toonset.calib.flaws.stretched import Stretches, as_drawn, stretch_mannequin, unstretch

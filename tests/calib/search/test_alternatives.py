@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bench.stability.sheets import DrawnSheet, draw_sheet
+from lab.bench.stability.sheets import DrawnSheet, draw_sheet
 from toonset.calib import pipeline
 from toonset.calib.find_cameras import find_cameras
 from toonset.calib.fit.model_selection import PROPORTIONS, UNSTEADY, UNSTEADY_MARGIN

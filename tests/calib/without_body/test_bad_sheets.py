@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from bench.cases.bodies import random_body
+from lab.bench.cases.bodies import random_body
 from toonset.calib.calibrate import calibrate
 from toonset.calib.find_cameras import find_cameras
 from toonset.calib.options import Hints

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bench.cases.bodies import random_body
+from lab.bench.cases.bodies import random_body
 from toonset.calib.calibrate import calibrate
 from toonset.calib.options import Hints
 from toonset.calib.result import Calibration

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bench.cases.bodies import random_body
+from lab.bench.cases.bodies import random_body
 from toonset.calib.without_body.placing import Figures
 from toonset.dataset.silhouettes.hull_rays import contradiction, cut_rays
 from toonset.dataset.split.sheet import split_picture

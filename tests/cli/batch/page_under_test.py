@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from playwright.sync_api import Page
 
-from bench.batch.rows import FIRST_FIRST, sheet
+from lab.bench.batch.rows import FIRST_FIRST, sheet
 from toonset.cli.batch.table import SheetRow
 
 

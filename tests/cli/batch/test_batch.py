@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from bench.batch.sheets import write_sheets
+from lab.bench.batch.sheets import write_sheets
 from tests.conftest import Command, contents
 
 STAGES = ("--stages", "calibrate,palette")

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Request, expect
 
-from bench.batch.rows import FIRST_FIRST, draw_thumbs, many, sheet
+from lab.bench.batch.rows import FIRST_FIRST, draw_thumbs, many, sheet
 from tests.cli.batch.page_under_test import Shown, names_of, one_of_each
 from toonset.cli.batch import page as page_module
 from toonset.cli.batch.page import write_page

@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from bench.batch.cluster import make_cluster
-from bench.batch.sheets import write_sheets
+from lab.bench.batch.cluster import make_cluster
+from lab.bench.batch.sheets import write_sheets
 from tests.conftest import Command, contents
 from toonset.cli.batch import on_ray
 from toonset.errors import ToonsetError
@@ -120,12 +120,12 @@ def test_results_go_to_a_store(
 def test_what_crashes_or_hangs_is_told_as_on_one_machine(
     library: Path, cluster: Any, tmp_path: Path
 ) -> None:
-    for name in ("crash0.png", "hang0.png", "s0.png"):  # tests.batch.child behaves by names
+    for name in ("crash0.png", "hang0.png", "s0.png"):  # lab.kills.child behaves by names
         shutil.copy(library / "s0.png", tmp_path / name)
     words = [*("batch", str(tmp_path / "*.png"), "-o", str(tmp_path / "out"), "--json")]
     words += ["--with", f"calibrate --mesh {library / 'body0.obj'}", "--stages", "calibrate"]
     words += ["--time-limit", "20", "--ray", cluster.address]
-    child = [sys.executable, "-P", "-m", "tests.batch.child", *words]
+    child = [sys.executable, "-P", "-m", "lab.kills.child", *words]
     done = subprocess.run(child, cwd=ROOT, env=ENVIRONMENT, capture_output=True, text=True)
     assert done.returncode == 3, done.stderr
     assert "crash0: quarantined: its worker ended by SIGSEGV, 3 times" in done.stderr

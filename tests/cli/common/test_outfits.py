@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from bench.messy.sheet import make_messy_sheet
+from lab.bench.messy.sheet import make_messy_sheet
 from tests.cli.split_sheets import drawn_sheet
 from toonset.dataset.images.picture import encode_png
 from toonset.dataset.split.sheet import split_picture

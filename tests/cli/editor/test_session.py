@@ -14,7 +14,7 @@ from typing import Any, cast
 
 import pytest
 
-from bench.messy.sheet import make_messy_sheet
+from lab.bench.messy.sheet import make_messy_sheet
 from toonset.calib.without_body.judge import ASK
 from toonset.cli.editor import opening, refit
 from toonset.cli.editor import session as session_module

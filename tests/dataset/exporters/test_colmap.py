@@ -11,7 +11,7 @@ import numpy as np
 import pycolmap
 import pytest
 
-from bench.cases.bodies import random_body
+from lab.bench.cases.bodies import random_body
 from tests.dataset.exporters.exported_views import bundle_of, noise, views_all_round
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame

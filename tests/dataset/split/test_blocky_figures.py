@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bench.cases.bodies import random_body
+from lab.bench.cases.bodies import random_body
 from tests.figures import boxes
 from toonset.calib.find_cameras import find_cameras
 from toonset.calib.fit.align import Fit

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from bench.messy.sheet import make_messy_sheet
+from lab.bench.messy.sheet import make_messy_sheet
 from toonset.dataset.split.corrections import CORRECTIONS
 from toonset.dataset.split.sheet import PictureOptions, split_picture
 from toonset.errors import SheetError

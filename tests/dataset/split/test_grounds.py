@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from bench.messy.sheet import make_messy_sheet
+from lab.bench.messy.sheet import make_messy_sheet
 from toonset.cli.editor.scene import sheet_url
 from toonset.dataset.images.zones import find_meetings, find_zones
 from toonset.dataset.split.background import find_background, remove_residual_alpha, ring_of

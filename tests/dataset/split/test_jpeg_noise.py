@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from bench.messy.sheet import make_messy_sheet
+from lab.bench.messy.sheet import make_messy_sheet
 from toonset.dataset.images.jpeg_noise import has_jpeg_grid
 from toonset.dataset.split.background import difference, find_background, with_final_tolerance
 

@@ -4,9 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
-from bench.cases.bodies import random_body
-from bench.messy.options import DIFFICULTIES
-from bench.messy.sheet import make_messy_sheet
+from lab.bench.cases.bodies import random_body
+from lab.bench.messy.options import DIFFICULTIES
+from lab.bench.messy.sheet import make_messy_sheet
 from toonset.dataset.split import segment
 from toonset.dataset.split.background import find_background
 from toonset.dataset.split.sheet import PictureOptions, Segmentation, split_picture
@@ -16,7 +16,7 @@ from toonset.errors import SheetError
 
 WHITE, RED, BLUE, SKIN = (255, 255, 255), (200, 30, 40), (20, 60, 180), (236, 188, 155)
 GREY, BLACK = (80, 80, 80), (10, 10, 10)
-HARD = ("touching", "overlap", "glued study")  # not always right: see `python -m bench split`
+HARD = ("touching", "overlap", "glued study")  # not always right: see `python -m lab.bench split`
 
 
 def paper(width: int, height: int) -> np.ndarray:

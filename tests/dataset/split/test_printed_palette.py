@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from bench.messy.options import MessyOptions
-from bench.messy.sheet import make_messy_sheet
+from lab.bench.messy.options import MessyOptions
+from lab.bench.messy.sheet import make_messy_sheet
 from toonset.dataset.split.sheet import split_picture
 
 COLORS = ((217, 84, 48), (38, 138, 140), (124, 72, 48), (46, 58, 104), (250, 240, 222), (0, 0, 0))

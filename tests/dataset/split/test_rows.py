@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from bench.messy.sheet import MessySheet, make_messy_sheet
+from lab.bench.messy.sheet import MessySheet, make_messy_sheet
 from tests.dataset.split.test_messy_sheets import iou
 from toonset.dataset.split.figures.blobs import find_blobs
 from toonset.dataset.split.figures.rows import Taken, find_groups

@@ -2,10 +2,10 @@
 
 import pytest
 
-from bench.messy.sheet import make_messy_sheet
-from bench.split.cases import Drawn, SplitCase
-from bench.split.methods import by_toonset
-from bench.split.score import score
+from lab.bench.messy.sheet import make_messy_sheet
+from lab.bench.split.cases import Drawn, SplitCase
+from lab.bench.split.methods import by_toonset
+from lab.bench.split.score import score
 from toonset.dataset.split.sheet import split_picture
 
 

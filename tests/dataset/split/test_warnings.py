@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from bench.messy.sheet import make_messy_sheet
+from lab.bench.messy.sheet import make_messy_sheet
 from toonset.dataset.split.background import find_background
 from toonset.dataset.split.figures.rows import LIKELIEST, Taken
 from toonset.dataset.split.segment import find_layout, find_paint

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from PIL import Image, ImageDraw
 from pydantic import TypeAdapter
 
-from bench.messy.sheet import make_messy_sheet
+from lab.bench.messy.sheet import make_messy_sheet
 from toonset.dataset.split_folder.corrected import Given, match_boxes, overlap
 from toonset.dataset.split_folder.corrections import (
     Corrections,

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.cases.bodies import random_body
+from lab.bench.cases.bodies import random_body
 from toonset.dataset.bundle.transforms_read import read_cameras
 from toonset.dataset.images.picture import decode_rgba, encode_jpeg, load_rgba
 from toonset.dataset.mannequin.make import Mannequin, default_mannequin

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.cases.bodies import random_body
+from lab.bench.cases.bodies import random_body
 from toonset.camera import Camera
 from toonset.dataset.bundle.transforms_read import read_cameras
 from toonset.dataset.mesh.load import save_obj

@@ -10,8 +10,8 @@ import pytest
 import torch
 from torch import Tensor
 
-from bench.train.mlp import MlpField
-from bench.train.voxel import VoxelField
+from lab.bench.train.mlp import MlpField
+from lab.bench.train.voxel import VoxelField
 from toonset.dataset.silhouettes.bounds import Box
 from toonset.nerf.fields.base import Field, Places
 from toonset.nerf.fields.classifier import PaletteClassifier

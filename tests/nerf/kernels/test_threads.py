@@ -8,7 +8,7 @@ from functools import partial
 import pytest
 import torch
 
-from bench.cases.cases import train_cases
+from lab.bench.cases.cases import train_cases
 from toonset.nerf.kernels.threads import side_by_side, threads_in_use, working_threads
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.train.fit_field import fit_field

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.cases.bodies import random_body
+from lab.bench.cases.bodies import random_body
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.synthetic.options import SynthOptions

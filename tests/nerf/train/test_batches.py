@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 import torch
 
-from bench.cases.cases import train_cases
+from lab.bench.cases.cases import train_cases
 from toonset.dataset.bundle.scene import Scene
 from toonset.nerf.fields.base import Places
 from toonset.nerf.fields.triplane import TriplaneField

@@ -11,8 +11,8 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-from bench.train.mlp import MlpField
-from bench.train.voxel import VoxelField
+from lab.bench.train.mlp import MlpField
+from lab.bench.train.voxel import VoxelField
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.silhouettes.bounds import Box

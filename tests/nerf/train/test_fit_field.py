@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 import torch
 
-from bench.train.mlp import network
-from bench.train.painted_hull import painted
-from bench.train.voxel import voxels
+from lab.bench.train.mlp import network
+from lab.bench.train.painted_hull import painted
+from lab.bench.train.voxel import voxels
 from tests.nerf.ellipsoids import QUICK, held_out, scene_of, train_scene
 from toonset.dataset.bundle.scene import Scene
 from toonset.errors import BundleError

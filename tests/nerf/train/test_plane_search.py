@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import torch
 
-from bench.cases.cases import train_cases
+from lab.bench.cases.cases import train_cases
 from tests.cli.common.test_train_summary import metrics
 from toonset.cli.common.train_summary import summary
 from toonset.dataset.bundle.scene import Scene

@@ -12,8 +12,8 @@ import pytest
 from jaxtyping import Bool, UInt8
 from playwright.sync_api import Browser, Page
 
-from bench.view.compare import psnr, shown
-from bench.view.crumbs import left_behind
+from lab.bench.view.compare import psnr, shown
+from lab.bench.view.crumbs import left_behind
 from tests.nerf.bodies import Hand, body, sheet
 from tests.nerf.ellipsoids import QUICK
 from toonset.camera import Camera

@@ -16,7 +16,7 @@ import pytest
 from jaxtyping import UInt8
 from PIL import Image
 
-from bench.view.hues import left_hues
+from lab.bench.view.hues import left_hues
 from toonset.nerf.look.blend import DRAWN, DrawnView
 from toonset.nerf.viewer.layered import layered
 from toonset.nerf.viewer.scene import coding, layered_record

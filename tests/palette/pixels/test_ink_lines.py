@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from bench.cases.bodies import random_body
+from lab.bench.cases.bodies import random_body
 from toonset.dataset.synthetic.options import SynthOptions
 from toonset.dataset.synthetic.turnaround import Turnaround, make_turnaround
 from toonset.palette.pixels import ink_lines as contour_module

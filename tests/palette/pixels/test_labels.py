@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from bench.cases.bodies import random_body
+from lab.bench.cases.bodies import random_body
 from tests.palette.pictures import opaque
 from toonset.dataset.bundle.palette_files import write_palette
 from toonset.dataset.images.picture import encode_indexed_png, load_indexed_png
