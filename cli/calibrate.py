@@ -21,15 +21,9 @@ from toonset.cli.common.outfits import (
     outfit_folders,
     print_results,
 )
-from toonset.cli.common.output import (
-    OUTPUT_PANEL,
-    DetailPrinter,
-    ForceFlag,
-    Printer,
-    UpOption,
-    counted,
-)
+from toonset.cli.common.output import OUTPUT_PANEL, DetailPrinter, ForceFlag, Printer, UpOption
 from toonset.dataset.split_folder.options import SheetOptions
+from toonset.errors import counted
 from toonset.options import Body
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from toonset.cli.common.output import Printer, counted
-from toonset.errors import BundleError
+from toonset.cli.common.output import Printer
+from toonset.errors import BundleError, counted
 
 if TYPE_CHECKING:
     from toonset.dataset.bundle.problem_log import Problem, ProblemLog

@@ -10,14 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from toonset.cli.common.export_formats import TARGETS, Format, Job
-from toonset.cli.common.output import (
-    OUTPUT_PANEL,
-    ForceFlag,
-    Printer,
-    SeedOption,
-    UpOption,
-    counted,
-)
+from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, Printer, SeedOption, UpOption
+from toonset.errors import counted
 from toonset.write import check_output
 
 if TYPE_CHECKING:

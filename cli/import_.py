@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, Printer, counted
+from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, Printer
+from toonset.errors import counted
 from toonset.write import check_output
 
 if TYPE_CHECKING:

@@ -8,9 +8,7 @@ run is not ok, a cut is doubtful, a drawing contradicts the others); 128 + n end
 from __future__ import annotations
 
 import contextlib
-import importlib
 import io
-import keyword
 import os
 import signal
 import sys
@@ -26,22 +24,8 @@ from toonset.cli.common.flags import command_of
 from toonset.cli.common.help import Verb, Verbs, complete_at_first_tab
 from toonset.cli.common.output import lead_nowhere, say
 from toonset.cli.common.refusals import MORE_SPACE, refusal
+from toonset.cli.common.verbs import VERBS, function_of
 from toonset.errors import ToonsetError
-
-VERBS = (  # in the order in which they are used
-    *("split", "calibrate", "edit", "palette", "recolor", "train", "render", "view", "evaluate"),
-    *("mesh", "consistency", "info", "check", "export", "import", "mannequin", "synth"),
-    *("batch", "pack"),
-)
-
-# Where a verb shares another one's module:
-MODULES = {
-    "batch": "batch.batch",
-    "consistency": "evaluate",
-    "info": "check",
-    "pack": "batch.pack",
-    "recolor": "palette",
-}
 
 CATCHES_ALL = "trimesh"  # the one package here that goes on after any exception
 NAP_S = 0.02  # until a signal is heard again
@@ -79,9 +63,7 @@ def toonset(
 
 complete_at_first_tab()
 for _verb in VERBS:
-    _name = f"{_verb}_" if keyword.iskeyword(_verb) else _verb  # of the function
-    _module = importlib.import_module(f"toonset.cli.{MODULES.get(_verb, _name)}")
-    app.command(_verb, cls=Verb)(command_of(getattr(_module, _name)))
+    app.command(_verb, cls=Verb)(command_of(function_of(_verb)))
 
 
 def main() -> None:

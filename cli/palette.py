@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from toonset import lock
-from toonset.cli.common.output import OUTPUT_PANEL, DetailPrinter, ForceFlag, Printer, counted
+from toonset.cli.common.output import OUTPUT_PANEL, DetailPrinter, ForceFlag, Printer
 from toonset.dataset.split_folder.options import CORRECTIONS
+from toonset.errors import counted
 from toonset.lock import FOLDERS
 from toonset.palette.options import CHOICE_PANEL, PaletteOptions
 from toonset.write import check_output
@@ -63,8 +64,8 @@ def palette(
     sheets, tones/ into the bundle, replacing those of an earlier run; for images and other
     folders, or with -o, into a folder of their own.
     """
-    from toonset.cli.common.label_drawings import label_drawings
     from toonset.dataset.bundle.palette_files import check_map_folders, write_labelled
+    from toonset.dataset.label_drawings import label_drawings
     from toonset.dataset.split_folder.corrected import Given
     from toonset.dataset.split_folder.pictures import bundle_of, check_pictures, load_pictures
     from toonset.palette.extract import rule_of

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, Printer, counted
+from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, Printer
+from toonset.errors import counted
 from toonset.nerf.options import RenderOptions
 from toonset.write import check_output
 

@@ -9,16 +9,10 @@ from typing import Annotated, Literal
 import typer
 
 from toonset.cli.common.flags import Given
-from toonset.cli.common.output import (
-    OUTPUT_PANEL,
-    ForceFlag,
-    Printer,
-    SeedOption,
-    UpOption,
-    counted,
-)
+from toonset.cli.common.output import OUTPUT_PANEL, ForceFlag, Printer, SeedOption, UpOption
 from toonset.dataset.synthetic.artist_options import ArtistOptions
 from toonset.dataset.synthetic.options import CONDITIONS, SynthOptions
+from toonset.errors import counted
 from toonset.write import check_output
 
 WRITTEN = (

@@ -31,7 +31,7 @@ from tests.conftest import calibration_report
 from tests.lab.bench.stand_ins import measure_nothing
 from tests.test_documents import DOCUMENTS, text_of
 from toonset.camera import Camera
-from toonset.cli.main import VERBS
+from toonset.cli.common.verbs import VERBS
 from toonset.dataset.bundle.bundle import bundle_folder
 from toonset.dataset.bundle.camera_record import NativeCamera
 from toonset.dataset.bundle.transforms_read import read_cameras

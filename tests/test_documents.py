@@ -40,7 +40,8 @@ def steps_of_the_demo() -> list[list[str]]:
 def complaint(words: list[str]) -> str:
     """Return what toonset, or the bench, would not understand in a command line; empty if fine."""
     from lab.bench.__main__ import app as bench
-    from toonset.cli.main import VERBS, app
+    from toonset.cli.common.verbs import VERBS
+    from toonset.cli.main import app
 
     verb = next((word for word in words if not word.startswith("-")), None)
     if verb is None or verb in RUN_COMMANDS:

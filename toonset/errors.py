@@ -1,4 +1,4 @@
-"""Define the errors a user can cause, as one tree.
+"""Define the errors a user can cause, as one tree, and the words of messages.
 
     ToonsetError            exit code 2: bad input or usage; one line says where, what, what to do
     |- CameraError          a camera that cannot exist
@@ -85,3 +85,18 @@ def did_you_mean(word: str, choices: Iterable[str]) -> str:
     """Return "did you mean 'front'?" with the nearest choice; "" if none is near."""
     near = get_close_matches(word, list(choices), 1)
     return f"did you mean {near[0]!r}?" if near else ""
+
+
+def counted(number: int, thing: str) -> str:
+    """Return a number of things in words: "1 view", "2,000 views"."""
+    return f"{number:,} {thing}" + "s" * (number != 1)
+
+
+def duration(seconds: float) -> str:
+    """Return seconds as people say them: "8 s", "3 min 20 s", "2 h 5 min"."""
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60} s"
+    return f"{whole // 3600} h {whole % 3600 // 60} min"

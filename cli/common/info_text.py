@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from itertools import zip_longest
 from typing import Any
 
-from toonset.cli.common.output import counted
-from toonset.errors import printable
+from toonset.errors import counted, printable
 
 NAME_WIDTH = 10  # of the left column below the table
 MOST_COLORS, MOST_VIEWS, MOST_FILES = 16, 40, 10

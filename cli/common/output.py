@@ -125,11 +125,6 @@ def say(text: str) -> None:
         lead_nowhere(sys.stderr)
 
 
-def counted(number: int, thing: str) -> str:
-    """Return a number of things in words: "1 view", "2,000 views"."""
-    return f"{number:,} {thing}" + "s" * (number != 1)
-
-
 def _shown(text: str) -> str:
     """Return lines that a terminal shows as they are: they may hold names of files."""
     return "\n".join(map(printable, text.split("\n")))

@@ -16,9 +16,9 @@ from toonset.calib.calibrate import calibrate
 from toonset.calib.options import Hints
 from toonset.calib.without_body.cues import Cues
 from toonset.calib.write_bundle import save_bundle
-from toonset.cli.common.label_drawings import label_drawings
 from toonset.dataset.bundle.bundle import CALIBRATION, WRITTEN
 from toonset.dataset.bundle.palette_files import write_labelled
+from toonset.dataset.label_drawings import label_drawings
 from toonset.dataset.split_folder.corrected import Given
 from toonset.dataset.split_folder.corrections import parse_corrections
 from toonset.dataset.split_folder.load import Sheet, split_sheet

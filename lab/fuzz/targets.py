@@ -16,7 +16,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from toonset.cli.batch.sheets import list_sheets
+from toonset.apps.batch.sheets import list_sheets
+from toonset.cli.common.verb_stages import VERBS
 from toonset.dataset.bundle.calibration_file import read_calibration
 from toonset.dataset.bundle.transforms_read import read_cameras
 from toonset.dataset.images.picture import decode_rgba, encode_png, picture_size
@@ -159,7 +160,10 @@ def _targets() -> Iterator[tuple[str, Target]]:
         yield f"boxes.{kind}", file_of(f"a.{kind}", read_boxes)
     yield "corrections.json", file_of("a.json", read_corrections)
     for kind in ("csv", "jsonl"):
-        yield f"manifest.{kind}", file_of(f"a.{kind}", lambda file: list_sheets([str(file)], {}))
+        yield (
+            f"manifest.{kind}",
+            file_of(f"a.{kind}", lambda file: list_sheets([str(file)], {}, VERBS)),
+        )
     yield "data.tar", data_set("webdataset", "a.tar", "a.tar")
     yield "data.parquet", data_set("parquet", "a.parquet", "a.parquet")
     yield "data.jsonl", data_set("folder", "metadata.jsonl", ".")

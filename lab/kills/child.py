@@ -4,12 +4,13 @@ import os
 import signal
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from toonset.cli.batch import job, on_ray, stages
+from toonset.cli.common import verb_stages
 
-WELL_BEHAVED = on_ray.run_told
+WELL_BEHAVED = verb_stages.VERBS
 
 
 def run(
@@ -20,21 +21,15 @@ def run(
         os.kill(os.getpid(), signal.SIGSEGV)
     if home.name.startswith("hang"):
         time.sleep(1e6)
-    ran = stages.run(stage, words, sheets, home)
+    ran = WELL_BEHAVED.run(stage, words, sheets, home)
     with open(home.parents[1] / "completed", "a") as file:
         file.write(f"{home.name} {stage}\n")
     return ran
-
-
-def run_told(told: str) -> str:
-    """Do so in a process of Ray's."""
-    job.run = run
-    return WELL_BEHAVED(told)
 
 
 if __name__ == "__main__":
     from lab.kills import child  # so that Ray's processes find it by its name
     from toonset.cli.main import main
 
-    job.run, on_ray.run_told = child.run, child.run_told
+    verb_stages.VERBS = replace(WELL_BEHAVED, run=child.run)
     main()

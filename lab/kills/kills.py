@@ -15,7 +15,7 @@ from pathlib import Path
 
 from lab.bench.batch.sheets import MANIFEST, write_sheets
 from lab.contents import contents
-from toonset.cli.batch.table import TABLE, SheetRow, Table
+from toonset.apps.batch.table import TABLE, SheetRow, Table
 
 STAGES = ("--stages", "calibrate,palette")
 TIME_LIMIT_S = 30  # hanging sheets end so

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from toonset.errors import duration
+
 if TYPE_CHECKING:  # torch takes seconds to import, and these lines need none
     from toonset.nerf.train.loop import Moment
     from toonset.nerf.train.result import HeldOut
@@ -50,13 +52,3 @@ def line_of(status: Status) -> str:
         f"training: step {status.steps} of {status.of}, loss {status.loss:.4f}{held_out}, "
         f"{duration(status.left_s)} left"
     )
-
-
-def duration(seconds: float) -> str:
-    """Return seconds as people say them: "8 s", "3 min 20 s", "2 h 5 min"."""
-    whole = round(seconds)
-    if whole < 60:
-        return f"{whole} s"
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60} s"
-    return f"{whole // 3600} h {whole % 3600 // 60} min"

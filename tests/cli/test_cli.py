@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from toonset.cli.main import VERBS
+from toonset.cli.common.verbs import VERBS
 from toonset.dataset.bundle.transforms_read import read_cameras
 from toonset.dataset.mesh.load import load_mesh, save_obj
 

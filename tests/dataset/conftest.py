@@ -1,5 +1,5 @@
 """A batch that nobody had to run, packed in every format."""
 
-from tests.cli.batch.test_pack import batch as batch
-from tests.cli.batch.test_pack import make as make
-from tests.cli.batch.test_pack import packed as packed
+from tests.apps.batch.test_pack import batch as batch
+from tests.apps.batch.test_pack import make as make
+from tests.apps.batch.test_pack import packed as packed

@@ -11,7 +11,7 @@ import torch
 from torch.utils.data import ConcatDataset, DataLoader
 
 import toonset as ts
-from tests.cli.batch.test_pack import DONE, FORMATS, SHEETS, Make, pack
+from tests.apps.batch.test_pack import DONE, FORMATS, SHEETS, Make, pack
 from toonset.dataset.images.picture import encode_png
 from toonset.dataset.view_dataset import ViewItem
 from toonset.errors import BundleError, ToonsetError, UsageError

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from lab.kills.kills import faults
-from toonset.cli.batch.stages import Entry
-from toonset.cli.batch.table import TABLE, Plan, StageRow, Table
+from toonset.apps.batch.stages import Entry
+from toonset.apps.batch.table import TABLE, Plan, StageRow, Table
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -10,10 +10,10 @@ from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
-from toonset.cli.batch.dispatch import Limits, Runner
-from toonset.cli.batch.job import Job, Outcome
-from toonset.cli.batch.stages import Entry
-from toonset.cli.batch.table import TABLE, Plan, StageRow, Table
+from toonset.apps.batch.dispatch import Limits, Runner
+from toonset.apps.batch.job import Job, Outcome
+from toonset.apps.batch.stages import Entry
+from toonset.apps.batch.table import TABLE, Plan, StageRow, Table
 
 KEYS = {"calibrate": "0" * 64, "palette": "1" * 64}
 AT_ONCE = 1000  # sheets that run

@@ -11,7 +11,7 @@ from playwright.sync_api import Browser, Page
 
 from lab.bench.batch.rows import draw_thumbs, many
 from lab.bench.view.compare import chromium
-from toonset.cli.batch.page import PAGE, write_page
+from toonset.apps.batch.page import PAGE, write_page
 
 PICTURES = 2000  # sheets that have small pictures
 OPENED = 5

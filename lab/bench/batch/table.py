@@ -7,8 +7,8 @@ from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
-from toonset.cli.batch.stages import Entry
-from toonset.cli.batch.table import TABLE, Plan, StageRow, Table
+from toonset.apps.batch.stages import Entry
+from toonset.apps.batch.table import TABLE, Plan, StageRow, Table
 
 KEYS = {"calibrate": "0" * 64, "palette": "1" * 64}
 

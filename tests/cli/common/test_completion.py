@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from toonset.cli.main import VERBS
+from toonset.cli.common.verbs import VERBS
 
 SHELLS = ("bash", "zsh", "fish")
 

@@ -1,0 +1,1 @@
+"""Applications over the public interface: batches of sheets, pages in the browser."""
