@@ -14,7 +14,12 @@ from pathlib import Path
 from zipfile import ZipFile
 
 ROOT = Path(__file__).resolve().parents[1]
-NEEDED = ("toonset/py.typed", "toonset/cli/editor/page/", "toonset/nerf/viewer/page/")
+PAGES = (
+    "toonset/apps/batch/page/",
+    "toonset/apps/web/editor/page/",
+    "toonset/apps/web/viewer/page/",
+)
+NEEDED = ("toonset/py.typed", *PAGES)
 
 
 def run(*words: str | Path, cwd: Path) -> None:

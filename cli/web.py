@@ -18,7 +18,7 @@ from toonset.lock import hold
 from toonset.options import Body
 
 if TYPE_CHECKING:
-    from toonset.cli.editor.session import Session
+    from toonset.apps.web.editor.session import Session
 
 LOOK_S = 1.0  # between two looks at whether anybody is there
 ENDS = ("SIGINT", "SIGTERM", "SIGHUP")  # Ctrl-C, the system, the terminal's window
@@ -64,9 +64,10 @@ def view(
     """
     if out.suffix.lower() not in (".html", ".htm"):
         raise typer.BadParameter(f"{out}: a page's name ends in .html", param_hint="--out")
+    from toonset.apps.web.viewer.page import view_html
     from toonset.dataset.bundle.transforms_read import transforms_file
     from toonset.errors import BundleError
-    from toonset.nerf.viewer.build import run_of, view_html
+    from toonset.nerf.layered_views.build import run_of
     from toonset.palette.names import one_line
     from toonset.read import check_there
     from toonset.write import check_new_file, new_files, write_bytes
@@ -126,8 +127,8 @@ def edit(
     and palette follow within seconds. The bundle's edit.html is the same page without a server.
     Stop with Ctrl-C.
     """
-    from toonset.cli.editor.opening import folder_of, open_session
-    from toonset.cli.editor.server import Server
+    from toonset.apps.web.editor.opening import folder_of, open_session
+    from toonset.apps.web.editor.server import Server
 
     folder = folder_of(place, out)
     body = Body.NONE if is_no_body(mesh) else mesh

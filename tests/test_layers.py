@@ -59,11 +59,11 @@ FLOORS: dict[str, tuple[str, ...]] = {
         "render surface train",
         "score",
         "run",
-        "@training viewer",
+        "@training layered_views",
         "@leave_one_out",
     ),
-    "apps": ("batch",),
-    "cli": ("common", "editor", "@"),  # a verb imports no other verb
+    "apps": ("batch web.editor web.viewer",),
+    "cli": ("common", "@"),  # a verb imports no other verb
 }
 MOST_FILES, MOST_ROOMS = 16, 46  # in a folder; of the product
 

@@ -29,7 +29,7 @@ from toonset.html_page import html_page, json_text
 from toonset.write import new_files
 
 FOLDER = Path(__file__).parent / "page"
-STYLES = ("../../../nerf/viewer/page/base.css", "style.css")
+STYLES = ("../../web/viewer/page/base.css", "style.css")
 PAGE = "index.html"
 SHEETS, THUMBS, LOG = "sheets", "thumbs", "log.txt"
 OVERLAY, TURN = ".webp", ".turn.webp"  # ends of the small pictures' names

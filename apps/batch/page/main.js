@@ -4,7 +4,7 @@ import { countSheets, createAnswers, firstQuestion, hashOfQuestion, questionOfHa
 import { readHead, readSheets } from "./rows.js";
 import { amount, createSummary } from "./summary.js";
 import { createTable } from "./table.js";
-import { copyText, part, say } from "../../../nerf/viewer/page/elements.js";
+import { copyText, part, say } from "../../web/viewer/page/elements.js";
 
 /** @typedef {import("./question.js").Question} Question */
 

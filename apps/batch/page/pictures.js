@@ -1,6 +1,6 @@
 // The small pictures of a sheet. A turntable stands until a reader looks at its row, or turns all.
 
-import { element, part } from "../../../nerf/viewer/page/elements.js";
+import { element, part } from "../../web/viewer/page/elements.js";
 
 /** @typedef {import("./rows.js").Sheet} Sheet */
 /** @typedef {{picture: HTMLElement, play: (plays: boolean) => void}} Turn */

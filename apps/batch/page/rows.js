@@ -1,6 +1,6 @@
 // Reads the sheets that the page holds: what `apps/batch/page.py` wrote, in its order.
 
-import { part } from "../../../nerf/viewer/page/elements.js";
+import { part } from "../../web/viewer/page/elements.js";
 
 /** @typedef {"waiting" | "running" | "done" | "failed" | "quarantined"} SheetState */
 /** @typedef {"ok" | "weak" | "ambiguous" | "failed" | ""} Verdict "" where there is none yet */

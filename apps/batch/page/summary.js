@@ -1,8 +1,8 @@
 // How many sheets are in which state and have which verdict; each count is a filter.
 
 import { CAMERAS, RANK_NAMES, STATES } from "./question.js";
-import { element, part } from "../../../nerf/viewer/page/elements.js";
-import { VERDICTS } from "../../../nerf/viewer/page/verdict.js";
+import { element, part } from "../../web/viewer/page/elements.js";
+import { VERDICTS } from "../../web/viewer/page/verdict.js";
 
 /** @typedef {import("./question.js").Question} Question */
 /** @typedef {import("./question.js").Counts} Counts */

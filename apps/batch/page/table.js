@@ -3,8 +3,8 @@
 import { createTurns, overlayOf } from "./pictures.js";
 import { SORTED } from "./question.js";
 import { amount, STATE_ICONS } from "./summary.js";
-import { element, part } from "../../../nerf/viewer/page/elements.js";
-import { badge } from "../../../nerf/viewer/page/verdict.js";
+import { element, part } from "../../web/viewer/page/elements.js";
+import { badge } from "../../web/viewer/page/verdict.js";
 
 /** @typedef {import("./rows.js").Head} Head */
 /** @typedef {import("./rows.js").Sheet} Sheet */

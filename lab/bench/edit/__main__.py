@@ -24,9 +24,9 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
+from toonset.apps.web.editor.opening import open_session
+from toonset.apps.web.editor.session import Session
 from toonset.camera import angles_from_rotation, rotation_distance, rotation_from_angles
-from toonset.cli.editor.opening import open_session
-from toonset.cli.editor.session import Session
 from toonset.errors import ToonsetError
 from toonset.frames import OPENGL_FROM_OPENCV
 

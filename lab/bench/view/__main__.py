@@ -20,14 +20,15 @@ from playwright.sync_api import Page
 from lab.bench.view.compare import chromium, psnr, shown
 from lab.bench.view.crumbs import left_behind
 from lab.bench.view.hues import left_hues
+from toonset.apps.web.viewer.page import view_html
 from toonset.camera import Camera
 from toonset.nerf.fields.trained_field import TrainedField
+from toonset.nerf.layered_views.build import cameras_of
+from toonset.nerf.layered_views.ring import ring_through
 from toonset.nerf.render.recolor import recolor_run
 from toonset.nerf.render.turntable import drawn_on_sheet
 from toonset.nerf.render.views import render
 from toonset.nerf.run.folder import read_field
-from toonset.nerf.viewer.build import cameras_of, view_html
-from toonset.nerf.viewer.ring import ring_through
 from toonset.palette.names import hex_of
 
 EVERY, FRAMES = 6, 100

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from lab.bench.messy.sheet import make_messy_sheet
-from toonset.cli.editor.scene import sheet_url
+from toonset.apps.web.editor.scene import sheet_url
 from toonset.dataset.images.zones import find_meetings, find_zones
 from toonset.dataset.split.background import find_background, remove_residual_alpha, ring_of
 from toonset.dataset.split.background_zones import fit_backdrop, fit_steps

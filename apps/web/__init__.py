@@ -1,0 +1,1 @@
+"""Pages in the browser: a viewer of runs, an editor of bundles."""

@@ -1,1 +1,0 @@
-"""Write a run as one HTML page that anyone can open."""
