@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
+from toonset.dataset.bundle.palette_files import write_labelled
 from toonset.dataset.split_folder.corrected import Given
-from toonset.dataset.split_folder.pictures import Pictures
+from toonset.dataset.split_folder.pictures import Pictures, load_pictures
 from toonset.errors import PaletteError, ToonsetError
 from toonset.palette.corrected import correct_palette
 from toonset.palette.corrections import PaletteCorrections
 from toonset.palette.extract import Map, PaintMap, choose_palette
 from toonset.palette.options import PaletteOptions
 from toonset.palette.palette import Palette
+from toonset.palette.pixels.ink_lines import find_contours
 from toonset.palette.pixels.labels import Space
 
 
@@ -51,3 +54,15 @@ def label_drawings(
             drawn.pictures, contours, found, wanted, strokes, where=str(given.path), space=space
         )
     return replace(found, title=found.title or drawn.title), maps, notes
+
+
+def label_bundle(folder: Path, given: Given) -> None:
+    """Find the palette of a bundle's drawings, as a person corrected it, and write it there.
+
+    Raises:
+        ToonsetError: the corrections speak of colours that the drawings do not have.
+    """
+    drawn = load_pictures([folder])
+    contours = find_contours(drawn.pictures)
+    found, maps, _ = label_drawings(drawn, contours, given=given)
+    write_labelled(folder, found, drawn.names, drawn.pictures, contours, "rgb", maps)

@@ -8,6 +8,8 @@ from typing import Any
 
 import pytest
 
+import toonset as ts
+
 ROOT = Path(__file__).resolve().parents[1]
 # A stage imports only stages with a lower number: calib and nerf never see each other.
 LAYERS = {"palette": 1, "dataset": 2, "calib": 3, "nerf": 3, "apps": 4, "cli": 5}
@@ -35,7 +37,7 @@ FLOORS: dict[str, tuple[str, ...]] = {
         "bundle mannequin",
         "silhouettes synthetic",
         "split",
-        "@stored_views exporters split_folder",
+        "@bundle_files @stored_views exporters split_folder",
         "@label_drawings @packed_views importers",
         "@view_dataset",
     ),
@@ -64,6 +66,26 @@ FLOORS: dict[str, tuple[str, ...]] = {
     ),
     "apps": ("batch web.editor web.viewer",),
     "cli": ("common", "@"),  # a verb imports no other verb
+}
+# What an application imports of the stages beside names of `import toonset`, by its room: this list
+# is only to become shorter. Of the bottom layer (`toonset/*.py`) it may import everything.
+INNER: dict[str, tuple[str, ...]] = {
+    "batch": (
+        "dataset.bundle_files",  # bytes and records of a bundle's files
+        "dataset.images.folder",  # which files are pictures
+        "dataset.mesh.obj",  # which files a mesh names
+        "palette.names",
+    ),
+    "web.editor": (
+        "calib.without_body.cues",  # kept from one fit to the next
+        "dataset.bundle_files",
+        "dataset.label_drawings",
+        "dataset.split_folder.corrected",
+        "dataset.split_folder.load",  # the type of a cut sheet
+        "nerf.surface.decimate",
+        "palette.names",
+    ),
+    "web.viewer": ("nerf.layered_views.build",),
 }
 MOST_FILES, MOST_ROOMS = 16, 46  # in a folder; of the product
 
@@ -181,6 +203,43 @@ def test_bottom_layer_imports_no_stage() -> None:
     for path in (ROOT / "toonset").glob("*.py"):
         own_doors = ("__init__.py", "__main__.py")  # the public interface, the command
         assert path.name in own_doors or not imported_stages(path), path.name
+
+
+def inner_modules(path: Path) -> set[str]:
+    """Return the modules of stages that a source file imports, without "toonset." before them."""
+    stages = {f"toonset.{stage}" for stage in LAYERS}
+    modules = {dotted(file) for stage in LAYERS for file in (ROOT / stage).rglob("*.py")}
+    found = set()
+    for name in imported_names(path):
+        if ".".join(name.split(".")[:2]) in stages:
+            of = next((one for one in (name, name.rpartition(".")[0]) if one in modules), name)
+            found.add(of.removeprefix("toonset."))
+    return found
+
+
+@pytest.mark.parametrize("app", INNER)
+def test_application_sees_the_public_interface(app: str) -> None:
+    found = set[str]()
+    for path in (ROOT / "apps" / app.replace(".", "/")).glob("*.py"):
+        names = imported_names(path)
+        assert not {"importlib", "pkgutil", "__import__"} & names, path.relative_to(ROOT)
+        public = {name for name in names if name.count(".") == 1 and name.startswith("toonset.")}
+        known = {*dir(ts), *(file.stem for file in (ROOT / "toonset").glob("*.py")), *LAYERS}
+        assert {name.split(".")[1] for name in public} <= known, path.relative_to(ROOT)
+        found |= {name for name in inner_modules(path) if not name.startswith(f"apps.{app}.")}
+    assert found - {f"apps.{app}"} == set(INNER[app])
+
+
+def test_every_application_is_listed() -> None:
+    rooms = {path.parent for path in (ROOT / "apps").rglob("*.py") if path.name != "__init__.py"}
+    assert {".".join(room.relative_to(ROOT / "apps").parts) for room in rooms} == set(INNER)
+
+
+def test_command_line_loads_applications_with_their_verbs() -> None:
+    for path in (ROOT / "cli").glob("*.py"):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            module = node.module or "" if isinstance(node, ast.ImportFrom) else ""
+            assert not module.startswith("toonset.apps"), path.relative_to(ROOT)
 
 
 @pytest.mark.parametrize("folder", ["toonset", *LAYERS])

@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from toonset import __version__
-from toonset.apps.batch.records import ANGLES, PINHOLE, UNKNOWN, SheetRecord
+from toonset.apps.batch.records import ANGLES, UNKNOWN, SheetRecord
+from toonset.dataset.bundle_files import PINHOLE
 from toonset.errors import one_line
 
 SCHEMA = "toonset-dataset/1"

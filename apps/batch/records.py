@@ -15,37 +15,21 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+import toonset as ts
 from toonset.apps.batch.stages import BUNDLE
 from toonset.apps.batch.table import SheetRow
-from toonset.dataset.bundle.bundle import CALIBRATION, IMAGES, LABELS
-from toonset.dataset.bundle.calibration_file import read_calibration
-from toonset.dataset.bundle.calibration_schema import CalibrationFile, ViewRecord
-from toonset.dataset.bundle.palette_files import PALETTE_JSON
-from toonset.dataset.bundle.read_scene import (
-    check_label_names,
-    label_name,
-    read_labels,
-    read_palette_of,
-    read_picture,
+from toonset.dataset.bundle_files import (
+    PINHOLE,
+    BundleFiles,
+    CalibrationFile,
+    FrameRecord,
+    ViewRecord,
 )
-from toonset.dataset.bundle.transforms_read import (
-    PosedPicture,
-    member,
-    read_frames,
-    transforms_file,
-)
-from toonset.dataset.bundle.transforms_schema import FrameRecord, read_records
 from toonset.errors import BundleError
 from toonset.palette.names import hex_of
-from toonset.palette.palette import Palette
-from toonset.read import read_whole
 
-PNG = b"\x89PNG\r\n\x1a\n"
+MEND = "copy it back, or run the batch again"
 UNKNOWN = "unknown"  # license of a sheet where nobody says
-SAME_CAMERA = 1e-6  # relative: both files are written from the same numbers
-PINHOLE = ("fl_x", "fl_y", "cx", "cy", "w", "h")
 ANGLES = ("yaw_deg", "elevation_deg", "roll_deg")
 BLOCK = 512  # of a tar file
 
@@ -182,90 +166,23 @@ def read_sheet(
         raise BundleError(
             f"{folder}: is not there; copy it back, or run the batch again with --only {row.name}"
         )
-    file = transforms_file(folder)
-    calibration = read_calibration(_there(folder, CALIBRATION))
-    if calibration.verdict not in verdicts:
+    bundle = BundleFiles.of(folder, MEND)
+    if bundle.calibration.verdict not in verdicts:
         return None
-    frames, records = read_frames(file, need_pictures=True), read_records(file).frames
-    _check(file, records, calibration)
-    palette = _palette(folder, row)
-    if palette is not None:
-        check_label_names(file, frames)
-    of_sheet = _of_sheet(row, calibration, palette)
+    is_colored = any(one.stage == "palette" and one.state == "done" for one in row.stages)
+    palette, found = bundle.read(with_palette=is_colored, decode=decode)
+    of_sheet = _of_sheet(row, bundle.calibration, palette)
     views = []
-    for number, (frame, record) in enumerate(zip(frames, records, strict=True)):
-        if decode:
-            read_picture(frame, file)
-        known = of_sheet | _of_view(record, calibration.views[number]) | {"view": number}
+    for number, one in enumerate(found):
+        known = of_sheet | _of_view(one.record, one.judged) | {"view": number}
         values = {name: known[name] for name in FIELDS}
-        labels = None if palette is None else _labels(folder, frame, palette, decode=decode)
-        image = _png(_there(folder, record.file_path))
-        views.append(PackedView(values, Path(record.file_path).name, image, labels))
-    names = (file.name, CALIBRATION, *((PALETTE_JSON,) if palette else ()))
-    files = {name: read_whole(_there(folder, name), "JSON", BundleError) for name in names}
-    return SheetRecord(tuple(views), files)
-
-
-def _there(folder: Path, name: str) -> Path:
-    """Return a file of the bundle."""
-    found = member(folder, name)
-    if found is None:
-        raise BundleError(f"{folder / name}: is missing; copy it back, or run the batch again")
-    return found
-
-
-def _png(file: Path) -> bytes:
-    data = read_whole(file, "picture", BundleError)
-    if not data.startswith(PNG):
-        raise BundleError(f"{file}: is no PNG; copy it back, or run the batch again")
-    return data
-
-
-def _check(file: Path, records: list[FrameRecord], calibration: CalibrationFile) -> None:
-    """Refuse cameras that `toonset calibrate` has not written, or not together."""
-    whole = all(
-        record.toonset is not None and all(getattr(record, name) is not None for name in PINHOLE)
-        for record in records
-    )
-    named = [f"{IMAGES}/{Path(view.name).name}" for view in calibration.views]
-    same = named == [record.file_path for record in records] and all(
-        _is_same(record, view) for record, view in zip(records, calibration.views, strict=True)
-    )
-    if not (whole and same):
-        raise BundleError(
-            f"{file}: has other cameras than {CALIBRATION}; copy both back, or run the batch again"
-        )
-
-
-def _is_same(record: FrameRecord, view: ViewRecord) -> bool:
-    """Return whether both files say the same of a view's camera."""
-    one, other = record.toonset, view.camera
-    if one is None or one.size_wh != other.size_wh:
-        return False
-    left = [*one.rotation, one.target, one.center, [one.scale, one.k]]
-    right = [*other.camera_from_world_rotation, other.target, other.center_px]
-    right = [*right, [other.scale_px_per_unit, other.k]]
-    return np.allclose(np.hstack(left), np.hstack(right), SAME_CAMERA, SAME_CAMERA)
-
-
-def _palette(folder: Path, row: SheetRow) -> Palette | None:
-    """Return the palette of a sheet whose palette stage is done; None of another."""
-    if not any(one.stage == "palette" and one.state == "done" for one in row.stages):
-        return None
-    _there(folder, PALETTE_JSON)
-    return read_palette_of(folder)
-
-
-def _labels(folder: Path, frame: PosedPicture, palette: Palette, *, decode: bool) -> bytes:
-    """Return the label map of a view."""
-    file = _there(folder, f"{LABELS}/{label_name(frame)}")
-    if decode:
-        read_labels(folder, frame, len(palette.colors))
-    return _png(file)
+        name = Path(one.record.file_path).name
+        views.append(PackedView(values, name, one.image, one.labels))
+    return SheetRecord(tuple(views), bundle.contents(with_palette=palette is not None))
 
 
 def _of_sheet(
-    row: SheetRow, calibration: CalibrationFile, palette: Palette | None
+    row: SheetRow, calibration: CalibrationFile, palette: ts.Palette | None
 ) -> dict[str, Any]:
     """Return the values that all views of a sheet share."""
     colors = () if palette is None else palette.colors

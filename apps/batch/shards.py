@@ -30,7 +30,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from toonset.apps.batch.records import FIELDS, PackedView, SheetRecord
-from toonset.dataset.bundle.bundle import IMAGES, LABELS
+from toonset.dataset.bundle_files import IMAGES, LABELS
 from toonset.errors import SetupError
 from toonset.write import write_bytes
 

@@ -175,8 +175,7 @@ def file_name(place: str) -> str:
 
 def _whole(files: Any, path: str) -> list[str]:
     """Return a file behind a URL, and, of a mesh, those in its folder that it is read with."""
-    from toonset.dataset.mesh.mtl import ends_of, matches
-    from toonset.dataset.mesh.obj import material_files
+    from toonset.dataset.mesh.obj import material_files_in
 
     if not path.lower().endswith(".obj"):
         return [path]
@@ -189,19 +188,22 @@ def _whole(files: Any, path: str) -> list[str]:
             return []
         return [there.rstrip("/").rsplit("/", 1)[-1] for there in found]
 
-    def find(name: str) -> str | None:
-        ends = ("/".join(end) for end in ends_of(name))
-        paths = (f"{folder}/{end}" for end in (*ends, *matches(name, names_in)))
-        return next((there for there in paths if files.isfile(there)), None)
+    def is_file(place: str) -> bool:
+        return bool(files.isfile(f"{folder}/{place}"))
 
-    return [path, *material_files(files.cat_file(path), find, files.cat_file)]
+    def read(place: str) -> bytes:
+        data: bytes = files.cat_file(f"{folder}/{place}")
+        return data
+
+    found = material_files_in(files.cat_file(path), names_in, is_file, read)
+    return [path, *(f"{folder}/{place}" for place in found)]
 
 
 def _files(root: Path) -> list[Path]:
     """Return a file with those that it names, or all files below a folder but hidden ones."""
     if not root.is_dir():
         root.stat()
-        return _with_materials(root) if root.suffix.lower() == ".obj" else [root]
+        return _with_materials(root)
     found = []
     for folder, folders, names in os.walk(root):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
@@ -209,19 +211,11 @@ def _files(root: Path) -> list[Path]:
     return [file for file in found if file.is_file()]
 
 
-def _with_materials(mesh: Path) -> list[Path]:
-    """Return a mesh, and the files in its folder that it is read with."""
-    from toonset.dataset.mesh.mtl import beside
-    from toonset.dataset.mesh.obj import material_files
+def _with_materials(file: Path) -> list[Path]:
+    """Return a file, and of a mesh those in its folder that it is read with."""
+    from toonset.dataset.mesh.obj import material_files_beside
 
-    def find(name: str) -> str | None:
-        file = beside(mesh, name)
-        return None if file is None else str(file)
-
-    def read(file: str) -> bytes:
-        return Path(file).read_bytes()
-
-    return [mesh, *map(Path, material_files(mesh.read_bytes(), find, read))]
+    return [file, *(material_files_beside(file) if file.suffix.lower() == ".obj" else ())]
 
 
 def _stat(file: Path) -> tuple[int, int, int]:

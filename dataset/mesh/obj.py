@@ -8,7 +8,7 @@ materials.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import takewhile
 from pathlib import Path
@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Int, UInt8
 
-from toonset.dataset.mesh.mtl import library_names, read_mtl, text_of
+from toonset.dataset.mesh.mtl import beside, ends_of, library_names, matches, read_mtl, text_of
 from toonset.dataset.mesh.obj_materials import paint_pieces, read_library, shown_pieces
 from toonset.dataset.mesh.polygons import Triangles, triangulate
 from toonset.dataset.mesh.raw_triangles import RawTriangles, check_counts, listed
@@ -238,3 +238,38 @@ def material_files(
                 textures = (find(named.name) for _, named in material.maps)
                 found |= dict.fromkeys(file for file in textures if file is not None)
     return list(found)
+
+
+def material_files_beside(mesh: Path) -> list[Path]:
+    """Return the files in the folder of an OBJ file that its colours come from."""
+
+    def find(name: str) -> str | None:
+        file = beside(mesh, name)
+        return None if file is None else str(file)
+
+    def read(file: str) -> bytes:
+        return Path(file).read_bytes()
+
+    return [*map(Path, material_files(mesh.read_bytes(), find, read))]
+
+
+def material_files_in(
+    mesh: bytes,
+    names_in: Callable[[str], Sequence[str]],
+    is_file: Callable[[str], bool],
+    read: Callable[[str], bytes],
+) -> list[str]:
+    """Return the same of a mesh in any folder, as paths below it.
+
+    Args:
+        mesh: content of an OBJ file.
+        names_in: returns the names in a folder below the mesh's own, "" for itself.
+        is_file: returns whether a file is at a path below it.
+        read: returns the content of the file there.
+    """
+
+    def find(name: str) -> str | None:
+        ends = ("/".join(end) for end in ends_of(name))
+        return next((one for one in (*ends, *matches(name, names_in)) if is_file(one)), None)
+
+    return material_files(mesh, find, read)

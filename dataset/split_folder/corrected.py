@@ -15,6 +15,7 @@ from toonset.dataset.split_folder.corrections import (
     Corrections,
     SheetName,
     ViewCorrection,
+    parse_corrections,
     read_corrections,
 )
 from toonset.dataset.split_folder.pictures import Picture, Place
@@ -42,6 +43,11 @@ class Given:
     def of(cls, path: str | Path) -> Given:
         """Return the file's corrections; see `read_corrections` for what is refused."""
         return cls(Path(path), read_corrections(path))
+
+    @classmethod
+    def parsed(cls, data: bytes, where: str) -> Given:
+        """Return the corrections of a file's content; see `parse_corrections`."""
+        return cls(Path(where), parse_corrections(data, where))
 
     def check_beside(self, **options: object) -> None:
         """Refuse options that say what the corrections say.

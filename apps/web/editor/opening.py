@@ -8,6 +8,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+import toonset as ts
 from toonset.apps.web.editor.refit import (
     BY_HAND,
     CORRECTIONS,
@@ -23,18 +24,19 @@ from toonset.apps.web.editor.refit import (
 )
 from toonset.apps.web.editor.scene import PALETTE
 from toonset.apps.web.editor.session import PAGE, Session
-from toonset.dataset.bundle.bundle import CALIBRATION, WRITTEN
-from toonset.dataset.bundle.calibration_file import read_calibration
-from toonset.dataset.bundle.calibration_schema import CalibrationFile, InputFile
-from toonset.dataset.bundle.transforms_read import member, place_in
-from toonset.dataset.mesh.load import load_mesh
-from toonset.dataset.split_folder.corrections import parse_corrections
-from toonset.dataset.split_folder.load import Sheet, split_sheet
-from toonset.dataset.split_folder.options import SheetOptions
+from toonset.dataset.bundle_files import (
+    CALIBRATION,
+    WRITTEN,
+    CalibrationFile,
+    InputFile,
+    calibration_of,
+    member,
+)
+from toonset.dataset.split_folder.corrected import Given
+from toonset.dataset.split_folder.load import Sheet
 from toonset.errors import BundleError, SheetError, ToonsetError
 from toonset.lock import hold
-from toonset.mesh import Mesh, Up
-from toonset.options import Body
+from toonset.mesh import Up
 from toonset.palette.names import hex_of
 from toonset.read import check_there, parse_json, read_whole
 from toonset.view import SHEET
@@ -52,7 +54,7 @@ CUT_BY = (
     "outfit",
 )  # options of `calibrate` that a bundle records
 
-MeshOption = Path | Body | None  # None: what the bundle was made with
+MeshOption = Path | ts.Body | None  # None: what the bundle was made with
 
 
 def folder_of(place: Path, out: Path) -> Path:
@@ -86,7 +88,7 @@ def open_session(
 
     if not (folder / CALIBRATION).is_file():
         check_output(folder, [place], WRITTEN, force=False)
-        subject = Subject(place, _given(mesh, up, tell) or Body.DEFAULT, folder)
+        subject = Subject(place, _given(mesh, up, tell) or ts.Body.DEFAULT, folder)
         drawn, new = make_bundle(subject, NOTHING, ALL, None, progress)
         folder.parent.mkdir(parents=True, exist_ok=True)
         if folder.is_dir():
@@ -94,7 +96,7 @@ def open_session(
         os.replace(new, folder)
         clear_workshop(subject)
         return Session(subject, drawn, NOTHING, NOTHING, tell)
-    found = read_calibration(place_in(folder, CALIBRATION))
+    found = calibration_of(folder)
     subject = _subject(place, folder, found, _given(mesh, up, tell))
     clear_workshop(subject)
     for name in (CORRECTIONS, CALIBRATION, PAGE):
@@ -143,18 +145,18 @@ def _session(
     return Session(subject, DrawnSheet.of(sheet), corrections, corrections, tell)
 
 
-def _given(mesh: MeshOption, up: Up, tell: Callable[[str], None]) -> Mesh | Body | None:
+def _given(mesh: MeshOption, up: Up, tell: Callable[[str], None]) -> ts.Mesh | ts.Body | None:
     """Return the body that is asked for, and tell what was done to it."""
     if not isinstance(mesh, Path):
         return mesh
-    body = load_mesh(mesh, up=up)
+    body = ts.load_mesh(mesh, up=up)
     for remark in body.remarks:
         tell(remark)
     return body
 
 
 def _subject(
-    place: Path, folder: Path, found: CalibrationFile, given: Mesh | Body | None
+    place: Path, folder: Path, found: CalibrationFile, given: ts.Mesh | ts.Body | None
 ) -> Subject:
     """Return what a bundle was made of, or is to be made with another body."""
     sheets = [one for one in found.inputs if one.role not in (MESH, BY_HAND, *BESIDE_MESH)]
@@ -173,14 +175,14 @@ def _subject(
     record = next((one for one in found.inputs if one.role == MESH), None)
     if record is None:
         return Subject(
-            sheet, Body.DEFAULT if MANNEQUIN_MADE in found.options else Body.NONE, folder
+            sheet, ts.Body.DEFAULT if MANNEQUIN_MADE in found.options else ts.Body.NONE, folder
         )
     file = _found(record, folder, place)
     if file is None:
         raise BundleError(
             f"{folder}: was made with {record.name}, which is not beside it; give it: --mesh FILE"
         )
-    return Subject(sheet, load_mesh(file, up=_up(found)), folder)
+    return Subject(sheet, ts.load_mesh(file, up=_up(found)), folder)
 
 
 def _found(record: InputFile, folder: Path, place: Path) -> Path | None:
@@ -202,11 +204,11 @@ def _found(record: InputFile, folder: Path, place: Path) -> Path | None:
 def _has_body(found: CalibrationFile, subject: Subject) -> bool:
     """Return whether a bundle was made with this body."""
     record = next((one for one in found.inputs if one.role == MESH), None)
-    if isinstance(subject.body, Mesh):
+    if isinstance(subject.body, ts.Mesh):
         same = record is not None and record.sha256 == subject.body.sha256
         return same and subject.body.up == _up(found)
     made = MANNEQUIN_MADE in found.options
-    return record is None and (subject.body is Body.DEFAULT or not made)
+    return record is None and (subject.body is ts.Body.DEFAULT or not made)
 
 
 def _up(found: CalibrationFile) -> Up:
@@ -232,14 +234,14 @@ def _corrections_file(folder: Path, found: CalibrationFile, place: Path) -> byte
             )
         file = given
     data = read_whole(file, "corrections", SheetError)
-    parse_corrections(data, str(file))
+    Given.parsed(data, str(file))
     return data
 
 
 def _as_it_was_cut(subject: Subject, found: CalibrationFile) -> tuple[Sheet, dict[str, Any]]:
     """Return the drawings of a bundle without corrections, and its options as corrections."""
     options = {name: found.options[name] for name in CUT_BY if found.options.get(name)}
-    sheet = split_sheet(subject.sheet, SheetOptions(**options))
+    sheet = ts.split_sheet(subject.sheet, ts.SheetOptions(**options))
     if len(sheet.views) != len(found.views) or found.options.get("boxes"):
         raise BundleError(
             f"{subject.folder}: its sheet was cut by a file of boxes; run `toonset edit "

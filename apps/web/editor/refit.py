@@ -12,23 +12,15 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from toonset.calib.calibrate import calibrate
-from toonset.calib.options import Hints
+import toonset as ts
 from toonset.calib.without_body.cues import Cues
-from toonset.calib.write_bundle import save_bundle
-from toonset.dataset.bundle.bundle import CALIBRATION, WRITTEN
-from toonset.dataset.bundle.palette_files import write_labelled
-from toonset.dataset.label_drawings import label_drawings
+from toonset.dataset.bundle_files import CALIBRATION, WRITTEN
+from toonset.dataset.label_drawings import label_bundle
 from toonset.dataset.split_folder.corrected import Given
-from toonset.dataset.split_folder.corrections import parse_corrections
-from toonset.dataset.split_folder.load import Sheet, split_sheet
-from toonset.dataset.split_folder.pictures import load_pictures
+from toonset.dataset.split_folder.load import Sheet
 from toonset.json_file import read_json
 from toonset.lock import FOLDERS, hold, set_of
-from toonset.mesh import Mesh
-from toonset.options import Body
-from toonset.palette.pixels.ink_lines import find_contours
-from toonset.view import SHEET, InputFile, Origin, View
+from toonset.view import SHEET, InputFile, Origin
 from toonset.write import exchange_folders, write_bytes, write_json
 
 CORRECTIONS = "corrections.json"
@@ -49,7 +41,7 @@ class Subject:
     """
 
     sheet: Path
-    body: Mesh | Body
+    body: ts.Mesh | ts.Body
     folder: Path
 
     @property
@@ -113,13 +105,13 @@ def cut_sheet(
 ) -> tuple[Sheet, Path | None]:
     """Return the corrected drawings and their corrections file; None without corrections."""
     if corrections == NOTHING:
-        return split_sheet(sheet), None
+        return ts.split_sheet(sheet), None
     file = workshop / CORRECTIONS
     write_bytes(file, file_of(corrections))
-    return split_sheet(sheet, corrections=file), file
+    return ts.split_sheet(sheet, corrections=file), file
 
 
-def _labelled(sheet: Sheet, file: Path) -> tuple[View, ...]:
+def _labelled(sheet: Sheet, file: Path) -> tuple[ts.View, ...]:
     """Return drawings as they are cut, labelled as a file of corrections says."""
     files = (*(one for one in sheet.files if one.role != BY_HAND), InputFile.of(BY_HAND, file))
     origin = Origin(files, sheet.options)
@@ -161,9 +153,9 @@ def make_bundle(
         write_bytes(file, file_of(corrections))
         drawn = before
     views = drawn.sheet.views if file is None else _labelled(drawn.sheet, file)
-    hints = Hints(corrections=file)
-    found = calibrate(views, subject.body, hints, progress=progress, cues=drawn.cues)
-    save_bundle(new, found)
+    hints = ts.Hints(corrections=file)
+    found = ts.calibrate(views, subject.body, hints, progress=progress, cues=drawn.cues)
+    ts.write_bundle(new, found)
     if old.is_dir():
         _take_along(old, new)
     if changed.palette:
@@ -204,11 +196,7 @@ def find_palette(folder: Path, corrections: dict[str, Any]) -> None:
     Raises:
         ToonsetError: the corrections speak of colours that the drawings do not have.
     """
-    given = Given(Path(CORRECTIONS), parse_corrections(file_of(corrections), CORRECTIONS))
-    drawn = load_pictures([folder])
-    contours = find_contours(drawn.pictures)
-    found, maps, _ = label_drawings(drawn, contours, given=given)
-    write_labelled(folder, found, drawn.names, drawn.pictures, contours, "rgb", maps)
+    label_bundle(folder, Given.parsed(file_of(corrections), CORRECTIONS))
 
 
 def note_corrections(folder: Path, corrections: dict[str, Any]) -> None:

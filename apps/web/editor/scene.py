@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import math
 import re
-from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -12,28 +12,29 @@ from typing import Any
 import cv2
 import numpy as np
 from jaxtyping import Bool
+from PIL import Image
 
-from toonset.camera import Camera
-from toonset.dataset.bundle.bundle import CALIBRATION, LABELS, mannequin_of
-from toonset.dataset.bundle.calibration_file import read_calibration
-from toonset.dataset.bundle.calibration_schema import ViewRecord
-from toonset.dataset.bundle.palette_files import palette_title
-from toonset.dataset.bundle.transforms_read import member, place_in
-from toonset.dataset.images.picture import decode_rgba, encode_grey_png
+import toonset as ts
+from toonset.dataset.bundle_files import (
+    LABELS,
+    PALETTE_JSON,
+    ViewRecord,
+    calibration_of,
+    mannequin_of,
+    member,
+    palette_of,
+    palette_title,
+)
 from toonset.dataset.split_folder.load import Sheet
 from toonset.errors import PictureError
 from toonset.html_page import base64_text, data_url, html_page, json_text
-from toonset.mesh import Mesh
 from toonset.nerf.surface.decimate import decimate
-from toonset.palette.formats.json import read_palette_json
 from toonset.palette.names import hex_of
-from toonset.palette.palette import DroppedColor, PaletteColor
 from toonset.read import read_whole
-from toonset.view import View
 
 FOLDER = Path(__file__).parent / "page"
 STYLES = ("../../viewer/page/base.css", "style.css")
-PALETTE = "palette.json"
+PALETTE = PALETTE_JSON
 MOST_FACES = 6000  # that a page projects in every picture while it is dragged
 MASK_PX = 192  # along the longer side of a drawing's mask: what the outline error is measured on
 SHOWN = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg", b"GIF8": "image/gif"}
@@ -56,7 +57,7 @@ def scene_of(folder: Path, sheet: Sheet) -> dict[str, Any]:
     Raises:
         ToonsetError: a file of the bundle is missing or damaged.
     """
-    found = read_calibration(place_in(folder, CALIBRATION))
+    found = calibration_of(folder)
     source = sheet.split.sources[0]
     ground = source.background
     mesh = mannequin_of(folder)
@@ -76,7 +77,7 @@ def scene_of(folder: Path, sheet: Sheet) -> dict[str, Any]:
         ],
         **seen_on(sheet),
         "mannequin": None if mesh is None else _mannequin(mesh),
-        "palette": _palette(member(folder, PALETTE)),
+        "palette": _palette(palette_of(folder)),
     }
 
 
@@ -108,7 +109,7 @@ def sheet_url(path: Path, sheet: Sheet) -> str:
     """
     data = read_whole(path, "picture", PictureError)
     kind = next((kind for magic, kind in SHOWN.items() if data.startswith(magic)), None)
-    picture = decode_rgba(data, path)
+    picture = ts.load_picture(path)
     (cut,) = sheet.pictures
     if cut is not None and not np.array_equal(cut, picture):
         picture, kind = cut, None
@@ -118,7 +119,7 @@ def sheet_url(path: Path, sheet: Sheet) -> str:
     return data_url(data, kind)
 
 
-def _view(folder: Path, view: View, said: ViewRecord) -> dict[str, Any]:
+def _view(folder: Path, view: ts.View, said: ViewRecord) -> dict[str, Any]:
     camera = said.camera.camera()
     labels = member(folder, f"{LABELS}/{said.name}")
     yaw, elevation, roll = (math.degrees(angle) for angle in camera.angles)
@@ -139,7 +140,7 @@ def _view(folder: Path, view: View, said: ViewRecord) -> dict[str, Any]:
     }
 
 
-def _camera(camera: Camera, view: View) -> dict[str, Any]:
+def _camera(camera: ts.Camera, view: ts.View) -> dict[str, Any]:
     """Return a camera's numbers in pixels of the sheet: see `toonset.camera`."""
     center = camera.center + np.array(view.box[:2])
     return {
@@ -159,10 +160,12 @@ def _mask(mask: Bool[np.ndarray, "height width"]) -> bytes:
     by = min(1.0, MASK_PX / max(height, width))
     size = (max(1, round(by * width)), max(1, round(by * height)))
     small = cv2.resize(mask.astype(np.uint8) * 255, size, interpolation=cv2.INTER_AREA)
-    return encode_grey_png(small)
+    buffer = io.BytesIO()
+    Image.fromarray(small).save(buffer, "PNG")
+    return buffer.getvalue()
 
 
-def _mannequin(mesh: Mesh) -> dict[str, Any]:
+def _mannequin(mesh: ts.Mesh) -> dict[str, Any]:
     vertices, faces = _few_faces(mesh.vertices.tobytes(), mesh.faces.tobytes())
     low, high = mesh.bounds
     return {
@@ -184,12 +187,10 @@ def _few_faces(vertices: bytes, faces: bytes) -> tuple[bytes, bytes]:
     return places.astype("<f4").tobytes(), corners.astype("<u4").tobytes()
 
 
-def _palette(file: Path | None) -> dict[str, Any]:
-    if file is None:
+def _palette(found: ts.Palette | None) -> dict[str, Any]:
+    if found is None:
         return {"colors": [], "dropped": []}
-    found = read_palette_json(file)
-
-    def records(colors: Sequence[PaletteColor | DroppedColor]) -> list[dict[str, Any]]:
-        return [{"color": hex_of(one.rgb), "name": one.name, "share": one.share} for one in colors]
-
-    return {"colors": records(found.colors), "dropped": records(found.dropped)}
+    return {
+        key: [{"color": hex_of(one.rgb), "name": one.name, "share": one.share} for one in colors]
+        for key, colors in (("colors", found.colors), ("dropped", found.dropped))
+    }

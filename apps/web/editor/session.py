@@ -15,6 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+import toonset as ts
 from toonset.apps.web.editor.refit import (
     CORRECTIONS,
     Changed,
@@ -28,8 +29,7 @@ from toonset.apps.web.editor.refit import (
     put_in_place,
 )
 from toonset.apps.web.editor.scene import page_of, scene_of, seen_on, sheet_url
-from toonset.dataset.split_folder.corrections import parse_corrections
-from toonset.dataset.split_folder.load import split_sheet
+from toonset.dataset.split_folder.corrected import Given
 from toonset.errors import SheetError, ToonsetError, one_line
 from toonset.write import write_bytes
 
@@ -107,7 +107,7 @@ class Session:
             ToonsetError: they are invalid, the disk is full, or somebody else has written the file.
         """
         data = file_of(corrections)
-        parse_corrections(data, CORRECTIONS)
+        Given.parsed(data, CORRECTIONS)
         with self._news:
             if revision != self.revision:
                 raise StaleError
@@ -168,7 +168,7 @@ class Session:
         if not self.fitted.get("boxes"):
             self._seen = seen_on(self.drawn.sheet)
         elif not self._seen:  # who draws boxes wants to see what else there is
-            self._seen = seen_on(split_sheet(self.subject.sheet))
+            self._seen = seen_on(ts.split_sheet(self.subject.sheet))
         taken = {"group": self.fitted.get("group", 1), "outfit": self.fitted.get("outfit", "")}
         scene |= self._seen | taken
         with self._news:
