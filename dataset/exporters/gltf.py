@@ -119,11 +119,8 @@ def add_mannequin(file: Gltf, mesh: Mesh) -> int:
     if colors is not None:
         attributes["COLOR_0"] = file.add_array(colors)
     base = GREY if colors is None else [1.0] * 4
-    material = file.add(
-        "materials",
-        name="mannequin",
-        doubleSided=True,
-        pbrMetallicRoughness={"baseColorFactor": base, "metallicFactor": 0, "roughnessFactor": 1},
+    material = file.add_material(
+        "mannequin", {"baseColorFactor": base}, unlit=False, doubleSided=True
     )
     indices = file.add_array(faces.ravel(), ELEMENT_ARRAY_BUFFER)
     primitive = {"attributes": attributes, "indices": indices, "material": material}
@@ -133,12 +130,8 @@ def add_mannequin(file: Gltf, mesh: Mesh) -> int:
 def add_plane(file: Gltf, view: ExportView, corners: Float[np.ndarray, "4 3"]) -> int:
     """Return the node of a drawing's plane: unlit, seen from its front only."""
     texture = file.add_texture(encode_png(view.rgba), view.name)
-    material = file.add(
-        "materials",
-        name=view.name,
-        alphaMode="BLEND",
-        pbrMetallicRoughness={"baseColorTexture": {"index": texture}, "metallicFactor": 0},
-        extensions={"KHR_materials_unlit": {}},
+    material = file.add_material(
+        view.name, {"baseColorTexture": {"index": texture}}, alphaMode="BLEND"
     )
     middle = corners.mean(axis=0)  # vertices near 0 keep more digits in float32
     primitive = {

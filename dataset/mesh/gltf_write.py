@@ -19,7 +19,7 @@ from toonset.dataset.mesh.gltf_file import BINARY_CHUNK, JSON_CHUNK
 
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
 FLOAT, UNSIGNED_INT = 5126, 5125
-VARIANTS = "KHR_materials_variants"
+UNLIT, VARIANTS = "KHR_materials_unlit", "KHR_materials_variants"
 KINDS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 
 
@@ -67,6 +67,14 @@ class Gltf:
             self.add("samplers", wrapS=clamped, wrapT=clamped)
         return self.add("textures", source=image, sampler=0)
 
+    def add_material(
+        self, name: str, color: dict[str, object], *, unlit: bool = True, **more: object
+    ) -> int:
+        """Return a new matt material of one colour or picture; viewers do not shade unlit ones."""
+        matt = {**color, "metallicFactor": 0, "roughnessFactor": 1}
+        light: dict[str, object] = {"extensions": {UNLIT: {}}} if unlit else {}
+        return self.add("materials", name=name, **more, pbrMetallicRoughness=matt, **light)
+
     def mappings(self, materials: Sequence[int]) -> dict[str, Any]:
         """Return which material a primitive has in every variant, as part of its description.
 
@@ -85,7 +93,7 @@ class Gltf:
         """Return the GLB; `extras` go to its scene."""
         content = {
             "asset": {"version": "2.0", "generator": f"toonset {__version__}"},
-            "extensionsUsed": ["KHR_materials_unlit", *([VARIANTS] if self.variants else [])],
+            "extensionsUsed": [UNLIT, *([VARIANTS] if self.variants else [])],
             **({"extensions": {VARIANTS: {"variants": self.variants}}} if self.variants else {}),
             "scene": 0,
             "scenes": [{"nodes": self.roots, "extras": extras}],

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int, UInt8
@@ -158,7 +159,7 @@ def add_variants(
     surface: Surface,
     name: str,
     pictures: Sequence[UInt8[np.ndarray, "height width 3"]],
-    **more: object,
+    **more: Any,
 ) -> list[int]:
     """Return the material of a surface's own look and of every variant; equal ones are one.
 
@@ -180,17 +181,8 @@ def add_variants(
         called = f"{name} {looks[number].name}" if number else name
         if png not in known:
             texture = {"index": file.add_texture(png, called)}
-            known[png] = add_material(file, called, {"baseColorTexture": texture}, **more)
+            known[png] = file.add_material(called, {"baseColorTexture": texture}, **more)
     return [known[png] for png in files]
-
-
-def add_material(file: Gltf, name: str, color: dict[str, object], **more: object) -> int:
-    """Return a new material of one colour or picture, without light."""
-    surfacing = {**color, "metallicFactor": 0, "roughnessFactor": 1}
-    unlit: dict[str, object] = {"KHR_materials_unlit": {}}
-    return file.add(
-        "materials", name=name, pbrMetallicRoughness=surfacing, extensions=unlit, **more
-    )
 
 
 def hex_colors(palette: UInt8[np.ndarray, "colors 3"]) -> list[str]:

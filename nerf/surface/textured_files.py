@@ -22,7 +22,6 @@ from toonset.nerf.surface.color import neighbour_mean, vertex_normals
 from toonset.nerf.surface.files import (
     NAME,
     Surface,
-    add_material,
     add_mesh,
     add_variants,
     check_mesh_files,
@@ -128,7 +127,7 @@ def encode_textured_glb(textured: TexturedSurface) -> bytes:
     if textured.pen is not None:
         ink = linear_from_srgb(np.array(textured.pen.rgb) / 255).tolist()
         color: dict[str, object] = {"baseColorFactor": [*ink, 1.0]}
-        outline = [add_material(file, "outline", color, doubleSided=False)] * len(drawn)
+        outline = [file.add_material("outline", color, doubleSided=False)] * len(drawn)
         hull = _moved(_smooth(surface.vertices, surface.faces), surface.faces, half)
         add_mesh(file, "outline", outline, hull, surface.faces[:, ::-1])
     return file.encode({"palette": hex_colors(surface.palette)})
