@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.fit.align import tilt
+from toonset.calib.fit.tilt import tilt
 from toonset.calib.outline.pose import Pose, project
 from toonset.calib.search.candidates import Candidates
 from toonset.camera import Camera, angles_from_rotation, rotation_from_angles

@@ -16,7 +16,6 @@ from jaxtyping import Float
 from toonset.calib.evidence.common_elevation import common_elevation
 from toonset.calib.evidence.face import read_faces
 from toonset.calib.evidence.texture import read_paint
-from toonset.calib.fit.align import ElevationPrior
 from toonset.calib.fit.drawing_error import ROUGH_POINTS, WHITE_POINTS
 from toonset.calib.fit.landmarks import LandmarkFit, landmark_starts
 from toonset.calib.fit.model_selection import (
@@ -32,6 +31,7 @@ from toonset.calib.fit.model_selection import (
 from toonset.calib.fit.proportions import as_it_is
 from toonset.calib.fit.sheet_adjustment import JointFit, JointProblem, SheetModel
 from toonset.calib.fit.sheet_prior import Turn
+from toonset.calib.fit.tilt import ElevationPrior
 from toonset.calib.fit.turned_bodies import account_for_turned_bodies
 from toonset.calib.flaws.cropped import ending_at
 from toonset.calib.flaws.cropped_evidence import Cuts, possible_cuts, prove_cuts

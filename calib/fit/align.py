@@ -13,13 +13,13 @@ with iterative closest points instead of colour lines: a drawing has its outline
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
+from toonset.calib.fit.tilt import ANYWHERE, upright_prior
 from toonset.calib.outline.correspondences import Drawing, Matches, match
 from toonset.calib.outline.mesh_edges import Surface
 from toonset.calib.outline.pose import PARAMETERS, Pose, project, project_with_jacobian
@@ -27,21 +27,9 @@ from toonset.camera import rotation_distance
 
 MAX_TURN = np.radians(12.0)  # per iteration: beyond it the matches of this iteration mean nothing
 MERGED = np.radians(3.0)  # starts this near to each other go to the same optimum
-ROLL_SIGMA = np.radians(4.0)  # drawings stand upright
 NOISE_OF_HEIGHT = 0.012  # a drawn outline's typical error; sets the priors' strength
 EFFECTIVE_POINTS = 40.0  # weight of a view's outline against the priors, in points
-# Elevations of sheets without an outline fitted to a mannequin: all of 45 collected ones are drawn
-# at eye level, sprites from anywhere (docs/decisions.md)
-LEVEL_SPREAD, P_STEEP = np.radians(3.0), 0.05
 INDEPENDENT_POINTS = 10.0  # outline errors of a view when alternative poses are compared
-
-
-@dataclass(frozen=True)
-class ElevationPrior:
-    """Prior of a view's elevation, radians."""
-
-    mean: float = np.radians(5.0)  # artists look slightly down
-    sigma: float = np.radians(20.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,32 +131,8 @@ def _gauss_newton_step(
     weights = weights * EFFECTIVE_POINTS / (NOISE_OF_HEIGHT * height_px) ** 2
     normal = (rows * weights[:, None]).T @ rows
     gradient = rows.T @ (weights * residual)
-    prior_matrix, prior_gradient = upright_prior(pose, ElevationPrior())
+    prior_matrix, prior_gradient = upright_prior(pose, ANYWHERE)
     normal += prior_matrix + 1e-3 * np.diag(np.diag(normal)) + 1e-9 * np.eye(PARAMETERS)
     step = -np.linalg.solve(normal, gradient + prior_gradient)
     turn = float(np.linalg.norm(step[:3]))
     return step * min(1.0, MAX_TURN / max(turn, 1e-12), 0.3 / max(abs(step[5]), 1e-12))
-
-
-def upright_prior(
-    pose: Pose, prior: ElevationPrior
-) -> tuple[Float[np.ndarray, "6 6"], Float[np.ndarray, " 6"]]:
-    """Return the Gauss-Newton matrix and gradient of the roll and elevation priors."""
-    (roll, elevation), slopes = tilt(pose)
-    precision = np.array([1 / ROLL_SIGMA**2, 1 / prior.sigma**2])
-    matrix, gradient = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(PARAMETERS)
-    matrix[:3, :3] = (slopes.T * precision) @ slopes
-    gradient[:3] = (np.array([roll, elevation - prior.mean]) * precision) @ slopes
-    return matrix, gradient
-
-
-def tilt(pose: Pose) -> tuple[tuple[float, float], Float[np.ndarray, "2 3"]]:
-    """Return (roll, elevation) in radians and their derivatives by the left increment w.
-
-    With up = R e_y: roll = atan2(up_x, -up_y), elevation = atan2(-up_z, |up_xy|), d up = w x up.
-    """
-    x, y, z = pose.rotation[:, 1].tolist()
-    flat = max(math.hypot(x, y), 1e-6)
-    d_roll = [-x * z / flat**2, -y * z / flat**2, (x * x + y * y) / flat**2]
-    d_elevation = [-y / flat, x / flat, 0.0]
-    return (math.atan2(x, -y), math.atan2(-z, flat)), np.array([d_roll, d_elevation])

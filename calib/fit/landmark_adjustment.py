@@ -13,10 +13,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Bool, Float
 
-from toonset.calib.fit.align import LEVEL_SPREAD, P_STEEP, ElevationPrior, tilt
 from toonset.calib.fit.landmark_residuals import Pairs, energy_of, normal_equations, pixel_sigmas
 from toonset.calib.fit.sheet_adjustment import MAX_K_RADIUS
 from toonset.calib.fit.sheet_prior import SharedPrior, Spreads, anchors, sheet_priors
+from toonset.calib.fit.tilt import ANYWHERE, ElevationPrior, level_or_steep, tilt
 from toonset.calib.outline.pose import PARAMETERS, Pose
 
 NORMAL = 1.2018  # makes sigma the standard deviation of normal errors: 2 / E[weight |r|^2]
@@ -28,7 +28,6 @@ SETTLED = 2  # steps before sigma and the spreads are estimated
 CONVERGED, SIGMA_CONVERGED = 1e-5, 0.01  # radians or log scale; relative
 MOST_DAMPING, LEAST_DAMPING = 1e6, 1e-9  # of Levenberg-Marquardt
 LEAST_FREE = 1e-6  # coordinates beyond what cameras and priors explain
-LEVEL, ANYWHERE = ElevationPrior(0.0, LEVEL_SPREAD), ElevationPrior()
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +201,7 @@ class _System:
         honest = np.sqrt(share * left + (1 - share) * CLICK_OF_HEIGHT**2)
         priors = self._priors(poses)
         spreads = {n: p.spread(covariance, getattr(usual, n)) for n, p in priors.items()}
-        level = _level(float(priors["elevation"].values.mean()))
+        level = level_or_steep(float(priors["elevation"].values.mean()))
         return Shared(float(np.exp(logs / 2)), float(honest), replace(usual, **spreads), level)
 
     def _priors(self, poses: Sequence[Pose]) -> dict[str, SharedPrior]:
@@ -212,21 +211,6 @@ class _System:
         priors = self._priors(poses)
         own = [(prior, getattr(self.shared.spreads, name)) for name, prior in priors.items()]
         return [*own, *anchors(priors, None, self.shared.elevation)]
-
-
-def _level(mean: float) -> ElevationPrior:
-    """Return the prior of a sheet's elevation: eye level, as far as its mean is likely to be that.
-
-    The mixture of both as one normal distribution of their mean precision (expectation step).
-    """
-    level, steep = (
-        p * np.exp(-0.5 * ((mean - prior.mean) / prior.sigma) ** 2) / prior.sigma
-        for p, prior in ((1 - P_STEEP, LEVEL), (P_STEEP, ANYWHERE))
-    )
-    near = level / (level + steep)
-    precisions = near / LEVEL.sigma**2, (1 - near) / ANYWHERE.sigma**2
-    middle = precisions[1] * ANYWHERE.mean / sum(precisions)
-    return ElevationPrior(float(middle), float(sum(precisions) ** -0.5))
 
 
 def _moved(poses: Sequence[Pose], step: Float[np.ndarray, " u"], most_k: float) -> tuple[Pose, ...]:

@@ -13,9 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.fit.align import ROLL_SIGMA, tilt
 from toonset.calib.fit.landmark_adjustment import (
-    ANYWHERE,
     CLICK_OF_HEIGHT,
     Adjusted,
     ViewPrior,
@@ -27,6 +25,7 @@ from toonset.calib.fit.landmark_starts import Pixels, Points, depth_reversed, st
 from toonset.calib.fit.model_selection import BIC_MARGIN
 from toonset.calib.fit.sheet_adjustment import FIRST_K_RADIUS
 from toonset.calib.fit.sheet_prior import Spreads
+from toonset.calib.fit.tilt import ANYWHERE, ROLL_SIGMA, tilt
 from toonset.calib.outline.pose import PARAMETERS, Pose
 from toonset.camera import rotation_distance
 

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.fit.align import MAX_TURN, ElevationPrior
+from toonset.calib.fit.align import MAX_TURN
 from toonset.calib.fit.drawing_error import (
     ROUGH_POINTS,
     Marginal,
@@ -34,6 +34,7 @@ from toonset.calib.fit.drawing_error import (
 )
 from toonset.calib.fit.proportions import Body
 from toonset.calib.fit.sheet_prior import Spreads, Turn, anchors, locks, sheet_priors
+from toonset.calib.fit.tilt import ElevationPrior
 from toonset.calib.outline.correspondences import Drawing, Matches, match
 from toonset.calib.outline.pose import PARAMETERS, Pose, pixel_slopes, project_with_jacobian
 

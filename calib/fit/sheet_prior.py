@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.fit.align import ElevationPrior, tilt
+from toonset.calib.fit.tilt import ElevationPrior, tilt
 from toonset.calib.outline.pose import PARAMETERS, Pose
 from toonset.camera import angles_from_rotation
 

@@ -29,9 +29,9 @@ from itertools import compress
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.fit.align import tilt
 from toonset.calib.fit.sheet_adjustment import JointFit
 from toonset.calib.fit.sheet_prior import TAIL, Spreads, Turn, off_places, yaw_slope
+from toonset.calib.fit.tilt import tilt
 from toonset.calib.outline.pose import PARAMETERS
 from toonset.camera import angles_from_rotation, rotation_from_angles
 

@@ -22,8 +22,8 @@ from jaxtyping import Float, Int
 
 from toonset.calib.evidence.face import FaceEvidence, face_log_likelihood
 from toonset.calib.evidence.texture import BROKEN, Paint, paint_log_likelihood
-from toonset.calib.fit.align import ElevationPrior, tilt
 from toonset.calib.fit.sheet_prior import Turn
+from toonset.calib.fit.tilt import ElevationPrior, tilt
 from toonset.calib.outline.pose import Pose
 from toonset.calib.search.candidates import Candidates
 from toonset.camera import angles_from_rotation

@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.fit.align import LEVEL_SPREAD, P_STEEP
+from toonset.calib.fit.tilt import LEVEL_SPREAD, elevation_log_prior
 from toonset.calib.without_body.sideways import axis_columns
 from toonset.camera import Camera
 from toonset.dataset.silhouettes.hull_rays import Silhouette
@@ -34,7 +34,6 @@ from toonset.view import View
 
 ELEVATIONS = np.radians([0.0, 2.5, 5, 7.5, 10, 12.5, 15, 20, 25, 30, 37, 45])
 FEW_ELEVATIONS = ELEVATIONS[::3]  # that tell turns apart
-STEEPEST = np.radians(50.0)  # elevation that sprites are drawn from
 # 1 / distance in heights: long lenses, a common one; none of 45 collected sheets has any
 NEARNESS, P_PERSPECTIVE = (0.1, 0.2, 0.45), 0.05
 FLOOR = 0.006  # of the height: outlines of faithful drawings, 1 % of it off, are this far apart
@@ -131,12 +130,6 @@ class Figures:
         return TurnedRays.of(
             [own.seen_by(c) for own, c in zip(self.silhouettes, cameras, strict=True)]
         )
-
-
-def elevation_log_prior(elevations: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-    """Return how usual elevations >= 0 are, nats: eye level, or, of sprites, anything up to 50."""
-    level = np.exp(-0.5 * (elevations / LEVEL_SPREAD) ** 2) * np.sqrt(2 / np.pi) / LEVEL_SPREAD
-    return np.log((1 - P_STEEP) * level + P_STEEP / STEEPEST)
 
 
 def coherence_log_likelihood(

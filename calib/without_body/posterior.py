@@ -27,12 +27,8 @@ from toonset.calib.evidence.mirrored_outlines import (
     read_mirrored_outlines,
 )
 from toonset.calib.evidence.texture import Paint, paint_evidence, read_paint
-from toonset.calib.without_body.placing import (
-    FEW_ELEVATIONS,
-    Figures,
-    coherence_log_likelihood,
-    elevation_log_prior,
-)
+from toonset.calib.fit.tilt import elevation_log_prior
+from toonset.calib.without_body.placing import FEW_ELEVATIONS, Figures, coherence_log_likelihood
 from toonset.calib.without_body.turns import (
     NEAR,
     P_MISPLACED,

@@ -12,11 +12,8 @@ import numpy as np
 from jaxtyping import Float
 
 from toonset.calib.evidence.texture import Paint, paint_evidence
-from toonset.calib.without_body.placing import (
-    Figures,
-    coherence_log_likelihood,
-    elevation_log_prior,
-)
+from toonset.calib.fit.tilt import elevation_log_prior
+from toonset.calib.without_body.placing import Figures, coherence_log_likelihood
 from toonset.dataset.silhouettes.turned_rays import TurnedRays
 
 STARTS = 4  # even, and three that are not

@@ -10,7 +10,8 @@ import trimesh
 
 from tests.figures import boxes, drawn
 from toonset.calib.evidence.face import FaceEvidence
-from toonset.calib.fit.align import ElevationPrior, Fit, align, tilt, upright_prior
+from toonset.calib.fit.align import Fit, align
+from toonset.calib.fit.tilt import ElevationPrior, tilt, upright_prior
 from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.outline.occluding_contour import (
     find_occluding_contour,
