@@ -60,6 +60,24 @@ def distance_to(marked: Mask) -> Float[np.ndarray, "height width"]:
     return np.sqrt(np.rint(np.square(found, dtype=np.float64)))
 
 
+def quick_distance_to(marked: Mask) -> Float[np.ndarray, "height width"]:
+    """Return `distance_to` within 2 %, in a quarter of the time; very large without any."""
+    return cv2.distanceTransform((~marked).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+
+
+def quick_depth_inside(mask: Mask) -> Float[np.ndarray, "height width"]:
+    """Return `quick_distance_to` the outside of a mask; beyond the picture is outside."""
+    return quick_distance_to(np.pad(~mask, 1, constant_values=True))[1:-1, 1:-1]
+
+
+def signed_distance(mask: Mask) -> Float[np.ndarray, "height width"]:
+    """Return the distance to a mask's outline, > 0 inside, by `quick_distance_to`.
+
+    The outline lies half a pixel before the first centre of the other kind.
+    """
+    return np.where(mask, quick_distance_to(~mask) - 0.5, 0.5 - quick_distance_to(mask))
+
+
 def depth_inside(mask: Mask) -> Float[np.ndarray, "height width"]:
     """Return how far inside a mask every pixel's centre lies; beyond the picture is outside."""
     return distance_to(np.pad(~mask, 1, constant_values=True))[1:-1, 1:-1] - 0.5

@@ -16,6 +16,7 @@ from toonset.camera import Camera
 from toonset.dataset.mesh.rasterize import depth_map
 from toonset.dataset.mesh.surroundings import connected_pieces
 from toonset.mesh import Mesh
+from toonset.raster import quick_distance_to
 from toonset.view import View
 
 HEIGHT_PX = 200  # of the pictures in which it is looked for
@@ -64,8 +65,8 @@ class _Drawn:
         small = cv2.resize(
             view.mask.astype(np.uint8), (width, height), interpolation=cv2.INTER_AREA
         )
-        free = np.pad((small == 0).astype(np.uint8), 1, constant_values=1)
-        self.away = cv2.distanceTransform(free, cv2.DIST_L2, 5)[1:-1, 1:-1] / HEIGHT_PX
+        drawn = np.pad(small > 0, 1)
+        self.away = quick_distance_to(drawn)[1:-1, 1:-1] / HEIGHT_PX
 
     def alone(
         self, mesh: Mesh, faces: Bool[np.ndarray, " faces"], points: Float[np.ndarray, "points 3"]

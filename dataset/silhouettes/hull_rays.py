@@ -18,6 +18,7 @@ from jaxtyping import Bool, Float, Int
 
 from toonset.camera import Camera
 from toonset.dataset.silhouettes.contour import drawn_contour
+from toonset.raster import signed_distance
 from toonset.view import Ends, View
 
 SAMPLES = 96  # along a ray through the whole figure: about 1 % of the height apart
@@ -36,7 +37,7 @@ class Silhouette:
         self.height = contour.height_px
         self.points = contour.points[:: max(1, len(contour.points) // POINTS)]
         self.pad = int(np.ceil(PAD_OF_HEIGHT * self.height))
-        self.distance = _signed_distance(_continued(view.mask, self.pad, contour.ends))
+        self.distance = signed_distance(_continued(view.mask, self.pad, contour.ends))
 
     def seen_by(self, camera: Camera) -> Silhouette:
         """Return the same drawing under another camera."""
@@ -204,11 +205,3 @@ def _continued(
     if right is not None:
         padded[:, right:] = padded[:, right - 1, None]
     return padded
-
-
-def _signed_distance(mask: Bool[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:
-    inside = mask.astype(np.uint8)
-    within = cv2.distanceTransform(inside, cv2.DIST_L2, cv2.DIST_MASK_5)
-    beyond = cv2.distanceTransform(1 - inside, cv2.DIST_L2, cv2.DIST_MASK_5)
-    # the outline lies half a pixel before the first centre of the other kind
-    return np.where(mask, within - 0.5, 0.5 - beyond).astype(np.float32)

@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Float
 from skimage.measure import find_contours
 
+from toonset import raster
 from toonset.camera import Camera
 from toonset.dataset.silhouettes.bounds import box_of_masks
 from toonset.dataset.silhouettes.mask import FAINT, thin
@@ -141,11 +142,7 @@ def signed_distance(alpha: Float[np.ndarray, "height width"]) -> Float[np.ndarra
     What is too thin to cover half a pixel, as a cape's corner seen from its edge, has no outline,
     but is there: around it, distances are to its middle.
     """
-    inside = ((alpha >= 0.5) | thin(alpha)).astype(np.uint8)
-    distance = cv2.distanceTransform(inside, cv2.DIST_L2, 5)
-    distance -= cv2.distanceTransform(1 - inside, cv2.DIST_L2, 5)
-    # from pixel centres to the outline between them
-    distance -= np.sign(distance) * np.float32(0.5)
+    distance = raster.signed_distance((alpha >= 0.5) | thin(alpha))
     known = (alpha > FAINT) & (alpha < 1 - FAINT) & (np.abs(distance) < 1)
     return np.where(known, alpha - 0.5, distance).astype(np.float32)
 

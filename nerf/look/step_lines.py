@@ -14,6 +14,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import map_coordinates
 
+from toonset.raster import quick_distance_to
+
 STEPS = (0.01, 0.015, 0.02, 0.025, 0.03, 0.035, 0.04, 0.05, 0.06, 0.08)  # of the figure's height
 USUAL, DOUBT = 0.035, 10.0  # a step from which lines are drawn; pixels that speak for the next one
 FEWEST = 100  # pixels on steps that must be seen, to say anything
@@ -225,7 +227,7 @@ def _distance(mask: Mask) -> Float[np.ndarray, "rows columns"]:
     """Return every pixel's distance to a mask, large without any."""
     if not mask.any():
         return np.full(mask.shape, 1e6, dtype=np.float32)
-    return cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+    return quick_distance_to(mask)
 
 
 def _spread(cover: Cover, reach: float) -> Cover:

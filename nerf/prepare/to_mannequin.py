@@ -28,6 +28,7 @@ from toonset.nerf.prepare.smaller import at_most
 from toonset.nerf.prepare.unwarp import MOST, Unwarping, Warp, warped
 from toonset.palette.pixels.ink_lines import find_contour
 from toonset.palette.pixels.labels import UNLABELLED
+from toonset.raster import quick_depth_inside
 
 OUTSIDE = 0.25  # of an outline's width: lines that reach farther beyond the silhouette lie about it
 MOST_OUTSIDE = 1.5  # of its width: what is farther out is not a line
@@ -213,7 +214,7 @@ def _inner_lines(
     for cover, sight, square in zip(covers, sights, squares, strict=True):
         gap = square.size / ROOM / OUTLINE_POINTS
         places, across = step_places(sight.fine, style.least * height, FINER, gap)
-        inside = _depth_inside(sight)
+        inside = quick_depth_inside(sight.alpha >= 0.5)
         clear = inside[tuple(np.floor(places).astype(int).T[::-1])] > width + style.width_px
         found.append(
             InnerLines(
@@ -244,8 +245,3 @@ def _height(sights: list[ShapeView]) -> float:
         for rows, sight in zip(tall, sights, strict=True)
     ]
     return float(np.median(heights))
-
-
-def _depth_inside(sight: ShapeView) -> Float[np.ndarray, "height width"]:
-    inside = np.pad(sight.alpha >= 0.5, 1).astype(np.uint8)
-    return cv2.distanceTransform(inside, cv2.DIST_L2, cv2.DIST_MASK_5)[1:-1, 1:-1]

@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float
 
+from toonset import raster
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame
 from toonset.dataset.silhouettes.mask import mask_of
@@ -147,11 +148,7 @@ def signed_distance(alpha: Picture) -> Picture:
 
     Beside the outline the coverage says where between pixels it runs.
     """
-    inside = alpha > 0.5
-    outer, inner = (
-        cv2.distanceTransform(part.astype(np.uint8), cv2.DIST_L2, 5) for part in (~inside, inside)
-    )
-    distance = np.where(inside, 0.5 - inner, outer - 0.5)
+    distance = -raster.signed_distance(alpha > 0.5)
     return np.where(np.abs(distance) < 1, (distance + 0.5 - alpha) / 2, distance).astype(np.float32)
 
 

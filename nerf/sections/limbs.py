@@ -16,6 +16,7 @@ from jaxtyping import Bool, Float
 from toonset.nerf.sections.drawing import Drawing, Mask, cells, sample
 from toonset.nerf.sections.grid import VOXEL_PX, Grid
 from toonset.nerf.sections.runs import Outline, Runs, median_along, smoothed
+from toonset.raster import quick_depth_inside, quick_distance_to
 
 LIMB_DEPTH = 1.6  # times the width
 SLENDER = 0.6  # of a run's half width: a limb is at least so wide
@@ -86,16 +87,14 @@ def thickness(
 
     Radii are whole, or, from FINE_RADII on, RADII_STEP apart.
     """
-    inside = np.pad(mask, 1).astype(np.uint8)
-    deep = cv2.distanceTransform(inside, cv2.DIST_L2, 5)[1:-1, 1:-1]
+    deep = quick_depth_inside(mask)
     radius = np.zeros_like(deep)
     coarse = np.arange(FINE_RADII, max(float(deep.max()), FINE_RADII + 1), RADII_STEP)
     for r in (*range(1, FINE_RADII), *coarse.tolist()):
         middles = deep >= r
         if not middles.any():
             break
-        away = cv2.distanceTransform((~middles).astype(np.uint8), cv2.DIST_L2, 5)
-        radius[away < r] = r
+        radius[quick_distance_to(middles) < r] = r
     return np.maximum(radius, deep), deep
 
 

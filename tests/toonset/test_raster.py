@@ -8,10 +8,14 @@ from toonset.raster import (
     connected_to,
     depth_inside,
     depth_near_edge,
+    distance_to,
     from_nearest,
     in_rows,
     median_inside,
     nearest,
+    quick_depth_inside,
+    quick_distance_to,
+    signed_distance,
     sized_parts,
     taken,
 )
@@ -36,6 +40,20 @@ def test_depth_near_an_edge_is_the_depth_inside(reach: int, share: float) -> Non
     shallow = whole < reach - 0.5
     np.testing.assert_allclose(found[shallow], whole[shallow], atol=1e-6)
     assert (found[~shallow] >= reach - 0.5 - 1e-6).all()
+
+
+@pytest.mark.parametrize("share", [0.5, 0.9, 0.999])
+def test_quick_distances_are_those_to_2_percent(share: float) -> None:
+    mask = np.random.default_rng(1).random((37, 52)) < share
+    np.testing.assert_allclose(quick_distance_to(~mask), distance_to(~mask), rtol=0.02)
+    np.testing.assert_allclose(quick_depth_inside(mask), depth_inside(mask) + 0.5, rtol=0.02)
+
+
+def test_a_signed_distance_changes_its_sign_half_way_between_centres() -> None:
+    mask = np.zeros((5, 6), dtype=bool)
+    mask[:, 2:] = True
+    assert signed_distance(mask)[0].tolist() == [-1.5, -0.5, 0.5, 1.5, 2.5, 3.5]
+    assert (signed_distance(~mask) == -signed_distance(mask)).all()
 
 
 @pytest.mark.parametrize("share", [0.0, 0.02, 1.0])
