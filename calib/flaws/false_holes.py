@@ -21,7 +21,7 @@ from toonset.calib.result import FilledHole, ViewCalibration
 from toonset.camera import Camera
 from toonset.dataset.split.background import difference
 from toonset.dataset.split.holes import CLEAR, LEAST_HOLE_PX
-from toonset.raster import dilate
+from toonset.raster import dilate, parts, sized_parts
 from toonset.view import Box, View
 
 Rgb = tuple[int, int, int]
@@ -70,11 +70,10 @@ def fill_false_holes(
 def _holes(view: View) -> Iterator[Bool[np.ndarray, "height width"]]:
     """Yield the see-through patches that the figure encloses."""
     enclosed = ~view.mask & ~_outside(view)
-    count, labels = cv2.connectedComponents(enclosed.view(np.uint8), connectivity=4)
-    for number in range(1, count):
-        patch = labels == number
-        if patch.sum() >= LEAST_HOLE_PX:
-            yield patch
+    labels, areas = sized_parts(enclosed, connectivity=4)
+    for number in range(1, len(areas)):
+        if areas[number] >= LEAST_HOLE_PX:
+            yield labels == number
 
 
 def _opposite(camera: Camera, other: Camera) -> bool:
@@ -136,8 +135,7 @@ def _is_closed(
     around = cv2.dilate(region, shape) > 0
     if not painted.solid[around].all() or painted.paper[region > 0].mean() > MOST_PAPER:
         return False
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(painted.paper.view(np.uint8))
-    areas = stats[:, cv2.CC_STAT_AREA]
+    labels, areas = sized_parts(painted.paper)
     inside = np.bincount(labels[around], minlength=len(areas))
     gaps = (areas >= LEAST_HOLE_PX) & (inside >= areas / 2)
     return not gaps[1:].any()  # the first is all that is not paper
@@ -156,7 +154,7 @@ def _with_paper(view: View, hole: Bool[np.ndarray, "height width"], paper: Rgb) 
 
 def _outside(view: View) -> Bool[np.ndarray, "height width"]:
     empty = np.pad(~view.mask, 1, constant_values=True)
-    labels = cv2.connectedComponents(empty.view(np.uint8), connectivity=4)[1]
+    labels = parts(empty, connectivity=4)
     return np.asarray(labels[1:-1, 1:-1] == labels[0, 0])
 
 

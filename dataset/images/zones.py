@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
-from toonset.raster import dilate, erode, from_nearest
+from toonset.raster import dilate, erode, from_nearest, sized_parts
 
 MEDIAN_PX = 5  # grain and thin lines are no edges
 EDGE = 7  # levels between neighbours
@@ -123,9 +123,8 @@ def find_zones(
     small = cv2.medianBlur(np.ascontiguousarray(rgb), MEDIAN_PX)
     near = np.ones((3, 3), np.uint8)
     steep = cv2.subtract(cv2.dilate(small, near), cv2.erode(small, near)).max(axis=2)
-    smooth = (steep <= EDGE).view(np.uint8)
-    _, found, stats, _ = cv2.connectedComponentsWithStats(smooth, connectivity=4)
-    large = stats[:, cv2.CC_STAT_AREA] >= least_share * smooth.size
+    found, areas = sized_parts(steep <= EDGE, connectivity=4)
+    large = areas >= least_share * found.size
     large[0] = False
     number = np.where(large, np.cumsum(large), 0).astype(np.int32)
     return Zones(number[np.asarray(found, dtype=np.int32)], shrink)

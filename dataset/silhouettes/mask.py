@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from toonset.errors import BundleError
+from toonset.raster import connected_to
 
 if TYPE_CHECKING:
     from toonset.dataset.bundle.scene import Frame, Scene
@@ -52,8 +53,7 @@ def thin(alpha: Float[np.ndarray, "height width"]) -> Bool[np.ndarray, "height w
         ridge |= before + after <= alpha
     inside = alpha >= 0.5
     thick = cv2.morphologyEx(alpha, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
-    _, parts = cv2.connectedComponents((alpha > FAINT).astype(np.uint8), connectivity=8)
-    hanging = (parts > 0) & np.isin(parts, np.unique(parts[inside]))
+    hanging = connected_to(inside, alpha > FAINT, connectivity=8)
     return ridge & hanging & ~inside & (thick < alpha / 2)
 
 

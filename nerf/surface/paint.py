@@ -17,7 +17,7 @@ from scipy import ndimage
 from toonset.nerf.look.drawings import SQUARE, Drawings, Texture
 from toonset.nerf.look.step_lines import step_edges
 from toonset.nerf.surface.strokes import SOFT, lines_of, strokes_of
-from toonset.raster import depth_inside, distance_to, nearest, parts
+from toonset.raster import depth_inside, distance_to, nearest, parts, sized_parts
 
 STEP = 0.015  # of the figure's height: an outline may be drawn where depth steps by so much
 SLIP = 0.02  # of the figure's height: so far from a step its line may lie
@@ -122,8 +122,8 @@ def _features(
 ) -> Bool[np.ndarray, "height width"]:
     found = np.zeros(labels.shape, dtype=np.uint8)
     for label in np.unique(labels):
-        _, part, about, _ = cv2.connectedComponentsWithStats((labels == label).astype(np.uint8))
-        small = about[:, cv2.CC_STAT_AREA] <= most_px
+        part, areas = sized_parts(labels == label)
+        small = areas <= most_px
         small[0] = False
         found |= small[part].astype(np.uint8)
     return cv2.dilate(found, SQUARE) > 0

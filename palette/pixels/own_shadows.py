@@ -16,7 +16,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 from scipy.special import log_ndtr
@@ -32,6 +31,7 @@ from toonset.palette.pixels.labels import (
     nearest_labels,
 )
 from toonset.palette.pixels.shadow import FLOOR, LEAST_PIECE, LINE, apply_shadow
+from toonset.raster import sized_parts
 
 SPREAD = 0.1  # logarithms: of paints' factors about the sheet's
 MOST_OFF = 3  # deviations
@@ -156,9 +156,9 @@ def _net_side(light: Mask, shade: Mask) -> float:
     """
     net = 0
     for left, right, sign in ((light, shade, -1), (shade, light, 1)):
-        border = (left[:, :-1] & right[:, 1:]).astype(np.uint8)
+        border = left[:, :-1] & right[:, 1:]
         if border.any():
-            pieces = cv2.connectedComponentsWithStats(border)[2][1:, cv2.CC_STAT_AREA]
+            pieces = sized_parts(border)[1][1:]
             net += sign * int(pieces[pieces >= LEAST_PIECE].sum())
     return float(net)
 

@@ -22,7 +22,7 @@ from jaxtyping import Bool, Float, Float32, Int, UInt8
 
 from toonset.palette.colors import shaded_oklab_from_rgb
 from toonset.palette.pixels.antialias import OPAQUE
-from toonset.raster import dilate, erode, is_uniform, nearest
+from toonset.raster import dilate, erode, is_uniform, nearest, parts
 
 TALL_PX = 260  # figures are parted no taller: patches are not counted in pixels of a scan
 GRAIN, WINDOW_PX, NEAR_PX = 18.0, 7, 3.0  # levels, window and reach of the filter that takes grain
@@ -121,8 +121,7 @@ def _basins(lab: Lab, opaque: Bool[np.ndarray, "height width"]) -> Numbers:
     levels = np.minimum(np.sqrt(squares) * STEPS, np.iinfo(np.uint16).max).astype(np.uint16)
     levels = cv2.GaussianBlur(levels, (0, 0), BASIN_SIGMA)
     lowest = (levels == cv2.erode(levels, np.ones((3, 3), np.uint8))) & opaque
-    _, seeds = cv2.connectedComponents(lowest.astype(np.uint8), connectivity=4)
-    return np.asarray(watershed(levels, seeds, mask=opaque)).astype(np.int64)
+    return np.asarray(watershed(levels, parts(lowest, connectivity=4), mask=opaque), np.int64)
 
 
 def _measured(numbers: Numbers, lab: Lab) -> Patches:

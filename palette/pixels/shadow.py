@@ -24,7 +24,7 @@ from scipy.special import log_ndtr
 
 from toonset.palette.palette import Shadow
 from toonset.palette.pixels.antialias import OPAQUE
-from toonset.raster import erode, nearest
+from toonset.raster import erode, nearest, sized_parts
 
 SIDE_PX = 3  # from a border to where the colours on both its sides are read
 NARROWEST_PX = 2 * SIDE_PX  # a picture; there is no border in it to look across
@@ -188,9 +188,9 @@ def _direction_bits(
             fits = _fits(each.drop, factor)
             for side in (True, False):
                 own = fits & (each.ahead == side)
-                mask = np.zeros(shape[:2], dtype=np.uint8)
-                mask[each.rows[own], each.columns[own]] = 1
-                pieces = cv2.connectedComponentsWithStats(mask)[2][1:, cv2.CC_STAT_AREA]
+                mask = np.zeros(shape[:2], dtype=bool)
+                mask[each.rows[own], each.columns[own]] = True
+                pieces = sized_parts(mask)[1][1:]
                 lengths += [int(n) if side else -int(n) for n in pieces if n >= LEAST_PIECE]
     if not lengths:
         return 0.0
