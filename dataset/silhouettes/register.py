@@ -1,64 +1,34 @@
 """Register a sheet's drawings: the least displacements that make their outlines one body's.
 
-Minimised over the numbers c_v of all drawings at once, by Gauss-Newton:
-
-    sum over outline points and other views of rho(r / sigma)^2 / CORRELATED  +  c' K^-1 c / tau^2
-
-What all drawings share is the body's own place and size, and kept out (`common`).
-tau, the size of the drawings' errors, comes from the sheet itself (expectation maximisation, as
-in MacKay 1992); whether there are errors at all is asked of the marginal likelihood against none,
-which charges every number that the data determine.
-
-Source: MacKay, "Bayesian interpolation", Neural Computation 1992.
+The residuals of `toonset.dataset.silhouettes.tangency` are fitted by the numbers of all drawings
+at once (`toonset.dataset.silhouettes.empirical_bayes`). What all drawings share is the body's own
+place and size, and kept out (`common`).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
 
 from toonset.camera import Camera
 from toonset.dataset.silhouettes.displacement import Moves
+from toonset.dataset.silhouettes.empirical_bayes import (
+    Fit,
+    Normal,
+    Numbers,
+    Prior,
+    fit,
+    unmoved,
+    weighed,
+)
 from toonset.dataset.silhouettes.outlines import Outlines
 from toonset.dataset.silhouettes.tangency import Placed, Touch, pixels_of, touch
 
 NOISE, NOISE_PX = 0.003, 0.2  # of the square, but at least so many pixels: an outline's own error
-CORRELATED = 5.0  # outline points in a row that err together
-FOREIGN = 0.02  # of the square: larger disagreements are more and more another shape, no error
-LEAST, MOST = 0.001, 0.02  # of the square: limits of tau; a larger one would bend other shapes
-SETTLED = 3  # rounds before tau is learned
 FEWER = 7  # figure pixels of which one is looked at, where a mean is wanted
 AFRESH = 4  # rounds after which whole rays are searched again, not only near the last best point
-
-
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """Registered drawings and the evidence for moving them.
-
-    Attributes:
-        numbers: (views, k) of the family, in units of the squares.
-        tau: the size of errors that the sheet asks for, of the square.
-        gain_nats: log marginal likelihood above that of drawings without error.
-        apart_px: root mean square disagreement per outline point, before and after, in pixels of
-            the small pictures.
-    """
-
-    numbers: Float[np.ndarray, "views k"]
-    tau: float
-    gain_nats: float
-    apart_px: tuple[float, float]
-
-
-@dataclass(frozen=True, eq=False)
-class _Normal:
-    """The normal equations at one place: H, gradient/2, cost, and squared distances per point."""
-
-    matrix: Float[np.ndarray, "m m"]
-    slope: Float[np.ndarray, " m"]
-    cost: float
-    apart: float
 
 
 def fit_moves(outlines: Outlines, moves: Moves, tau: float, rounds: int) -> Fit:
@@ -71,26 +41,23 @@ def fit_moves(outlines: Outlines, moves: Moves, tau: float, rounds: int) -> Fit:
         rounds: of Gauss-Newton.
     """
     views, count = len(outlines.views), len(moves.covariance)
-    precision = np.kron(np.eye(views), np.linalg.inv(moves.covariance))
-    numbers = np.zeros((views, count))
-    first, near = _linearised(outlines, moves, numbers, None)
-    idle = first.cost - log_volume(first.matrix, moves.covariance * tau**2, views)
-    if idle <= 0:  # even a perfect fit would not be worth its numbers
-        return Fit(numbers, 0.0, float(idle / 2), (first.apart, first.apart))
-    normal, flat = first, numbers.reshape(-1)
-    body, shares = common(outlines, moves)
-    for round_ in range(1, rounds + 1):
-        prior = precision / tau**2
-        flat = flat - np.linalg.solve(normal.matrix + prior, normal.slope + prior @ flat)
-        flat = flat - body @ (shares @ flat)
-        numbers = flat.reshape(views, count)
-        normal, near = _linearised(outlines, moves, numbers, near if round_ % AFRESH else None)
-        if round_ >= SETTLED:
-            tau = learn_error_size(energy(normal.matrix, precision, flat, tau), len(flat))
-    spent = normal.cost + flat @ precision @ flat / tau**2
-    volume = log_volume(normal.matrix, moves.covariance * tau**2, views)
-    gain = (first.cost - spent - volume) / 2
-    return Fit(numbers, tau, float(gain), (first.apart, normal.apart))
+    prior = Prior(np.kron(np.eye(views), np.linalg.inv(moves.covariance)))
+    normal, near = _linearised(outlines, moves, np.zeros((views, count)), None)
+    found = unmoved([normal], prior, tau)
+    if found is None:
+        body, shares = common(outlines, moves)
+
+        def linearise(flat: Numbers, round_: int) -> list[Normal]:
+            nonlocal near
+            numbers, known = flat.reshape(views, count), near if round_ % AFRESH else None
+            normal, near = _linearised(outlines, moves, numbers, known)
+            return [normal]
+
+        def gauge(flat: Numbers) -> Numbers:
+            return flat - body @ (shares @ flat[0])
+
+        found = fit(linearise, [normal], prior, tau, rounds, gauge=gauge)
+    return replace(found, numbers=found.numbers.reshape(views, count))
 
 
 def common(
@@ -121,7 +88,7 @@ def common(
 
 def _linearised(
     outlines: Outlines, moves: Moves, numbers: np.ndarray, near: list[np.ndarray] | None
-) -> tuple[_Normal, list[np.ndarray]]:
+) -> tuple[Normal, list[np.ndarray]]:
     """Return the normal equations at `numbers`, and where along the rays they were taken."""
     placed = Placed.of(outlines, moves, numbers)
     touches = _touches(placed, near)
@@ -137,7 +104,7 @@ def _touches(placed: Placed, near: list[np.ndarray] | None) -> list[Touch]:
     ]
 
 
-def _normal(placed: Placed, touches: list[Touch]) -> _Normal:
+def _normal(placed: Placed, touches: list[Touch]) -> Normal:
     views, count = placed.numbers.shape
     matrix = np.zeros((views, count, views, count))
     slope = np.zeros((views, count))
@@ -150,8 +117,7 @@ def _normal(placed: Placed, touches: list[Touch]) -> _Normal:
             if other == view:
                 continue
             residual, here, there = _pair(placed, view, other, found, own)
-            tame = 1 + (residual / (FOREIGN * size)) ** 2
-            weight = 1 / (tame * sigma) ** 2 / CORRELATED
+            weight, own_cost = weighed(residual, sigma, size)
             matrix[view, :, view] += here.T @ (weight[:, None] * here)
             matrix[other, :, other] += there.T @ (weight[:, None] * there)
             cross = here.T @ (weight[:, None] * there)
@@ -159,11 +125,11 @@ def _normal(placed: Placed, touches: list[Touch]) -> _Normal:
             matrix[other, :, view] += cross.T
             slope[view] += here.T @ (weight * residual)
             slope[other] += there.T @ (weight * residual)
-            cost += float((residual**2 / tame).sum()) / sigma**2 / CORRELATED
+            cost += own_cost
             squares += float((residual**2).sum())
     flat = views * count
-    points = max(1, sum(len(found.pixels) for found in touches))
-    return _Normal(matrix.reshape(flat, flat), slope.reshape(flat), cost, (squares / points) ** 0.5)
+    points = sum(len(found.pixels) for found in touches)
+    return Normal(matrix.reshape(flat, flat), slope.reshape(flat), cost, squares, points)
 
 
 def _pair(
@@ -194,34 +160,3 @@ def _pixel_jacobian(
         ahead, behind = (camera.unproject(pixels + s, depth) for s in (step, -step))
         columns.append(pixels_of(other, ahead) - pixels_of(other, behind))
     return np.stack(columns, axis=-1)
-
-
-def energy(
-    matrix: Float[np.ndarray, "k k"],
-    precision: Float[np.ndarray, "k k"],
-    numbers: Float[np.ndarray, " k"],
-    tau: float,
-) -> float:
-    """Return the expected energy of the numbers, in variances of the prior."""
-    from scipy.linalg import get_lapack_funcs
-
-    potrf, potri = get_lapack_funcs(("potrf", "potri"), (matrix,))
-    factor, _ = potrf(matrix + precision / tau**2, lower=True)
-    spread, _ = potri(factor, lower=True)  # its lower half: half the work of an inverse
-    twice = 2 * float(np.sum(np.tril(precision, -1) * spread))
-    trace = twice + float(np.sum(np.diag(precision) * np.diag(spread)))
-    return float(numbers @ precision @ numbers) + trace
-
-
-def learn_error_size(whole: float, count: int) -> float:
-    """Return the size of errors, by the energy of `count` numbers."""
-    return float(np.clip(np.sqrt(whole / count), LEAST, MOST))
-
-
-def log_volume(
-    matrix: Float[np.ndarray, "m m"], covariance: Float[np.ndarray, "k k"], views: int
-) -> float:
-    """Return log det(1 + K H): what the determined numbers cost."""
-    prior = np.kron(np.eye(views), np.linalg.inv(covariance))
-    before = views * np.linalg.slogdet(covariance)[1]
-    return float(np.linalg.slogdet(matrix + prior)[1] + before)

@@ -1,13 +1,11 @@
 """Fit yaws, shifts and sizes of a sheet's cameras until its outlines are those of one body.
 
-Minimised over each camera's shift, growth and yaw, by Gauss-Newton:
+The residuals of `toonset.dataset.silhouettes.tangency` are fitted by each camera's shift, growth
+and yaw (`toonset.dataset.silhouettes.empirical_bayes`), whose prior is
 
-    sum over outline points and other views of rho(r / sigma)^2 / CORRELATED
-      + |shift, 2 growth|^2 / tau^2 + (yaw / its sigma)^2
+    |shift, 2 growth|^2 / tau^2 + (yaw / its sigma)^2
 
-with r of `toonset.dataset.silhouettes.tangency`, noise and tau as in
-`toonset.dataset.silhouettes.register`. What outlines cannot tell is left as it was: the mean yaw,
-and the body's place and size.
+What outlines cannot tell is left as it was: the mean yaw, and the body's place and size.
 
 Source: Hernandez, Schmitt, Cipolla, "Silhouette coherence for camera calibration under circular
 motion", PAMI 2007, with distances instead of overlaps and a prior on every number.
@@ -16,25 +14,24 @@ motion", PAMI 2007, with distances instead of overlaps and a prior on every numb
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from toonset.camera import Camera, rotation_from_angles
 from toonset.dataset.silhouettes.displacement import ShiftAndScale
-from toonset.dataset.silhouettes.outlines import Outline, Outlines, Square
-from toonset.dataset.silhouettes.register import (
-    CORRELATED,
-    FOREIGN,
-    LEAST,
-    MOST,
-    NOISE,
-    NOISE_PX,
-    SETTLED,
+from toonset.dataset.silhouettes.empirical_bayes import (
     Fit,
-    common,
+    Normal,
+    Numbers,
+    Prior,
+    fit,
+    unmoved,
+    weighed,
 )
+from toonset.dataset.silhouettes.outlines import Outline, Outlines, Square
+from toonset.dataset.silhouettes.register import NOISE, NOISE_PX, common
 from toonset.dataset.silhouettes.tangency import Placed, Touch, pixels_of, touch
 
 PLACE, YAW, OWN = slice(0, 3), 3, 4  # a camera's numbers: shift x, shift y, growth; yaw
@@ -45,16 +42,6 @@ LENGTHENED = 1.6
 ENOUGH = 0.98  # of the disagreement before a round: what gains no more is settled
 
 _PLACES = ShiftAndScale.expected()
-
-
-@dataclass(frozen=True, eq=False)
-class _Normal:
-    """Normal equations: H, gradient / 2, cost and disagreement."""
-
-    matrix: Float[np.ndarray, "m m"]
-    slope: Float[np.ndarray, " m"]
-    cost: float
-    apart: float
 
 
 def fit_turns(
@@ -71,31 +58,38 @@ def fit_turns(
         rounds: of Gauss-Newton at most.
     """
     views = len(outlines.views)
-    flat = np.zeros(OWN * views)
-    deviation = _deviations(yaw_sigmas, tau)
-    first = normal = _linearised(outlines, flat, deviation > 0)
-    idle = first.cost - _log_volume(first.matrix, deviation)
-    if idle <= 0:  # even a perfect fit would not be worth its numbers
-        apart = (first.apart, first.apart)
-        return Fit(flat.reshape(views, OWN), 0.0, idle / 2, apart)
-    body, shares = common(outlines, _PLACES)
-    for round_ in range(1, rounds + 1):
-        flat = _improved(normal, deviation, flat)
-        own = flat.reshape(views, OWN)  # a view of `flat`
-        own[:, PLACE] -= (body @ (shares @ own[:, PLACE].reshape(-1))).reshape(views, -1)
-        if yaw_sigmas.all():
-            own[:, YAW] -= np.average(own[:, YAW], weights=yaw_sigmas**-2)
-        before, normal = normal.apart, _linearised(outlines, flat, deviation > 0)
-        if round_ >= SETTLED:
-            tau = _learned(normal.matrix, deviation, flat, tau)
-            deviation = _deviations(yaw_sigmas, tau)
-            if normal.apart > ENOUGH * before:
-                break
+    deviation = np.zeros((views, OWN))
+    deviation[:, PLACE] = np.sqrt(np.diag(_PLACES.covariance))
+    deviation[:, YAW] = yaw_sigmas
     free = deviation > 0
-    spent = normal.cost + float(((flat[free] / deviation[free]) ** 2).sum())
-    gain = (first.cost - spent - _log_volume(normal.matrix, deviation)) / 2
-    apart = (first.apart, normal.apart)
-    return Fit(flat.reshape(views, OWN), tau, gain, apart)
+    scaled = np.arange(OWN) != YAW  # by tau
+    precision = np.divide(1, deviation**2, out=np.zeros_like(deviation), where=free)
+    prior = Prior(*(np.diag((precision * part)[free]) for part in (scaled, ~scaled)))
+
+    def all_of(some: Numbers) -> Float[np.ndarray, "views 4"]:
+        own = np.zeros((views, OWN))
+        own[free] = some[0]
+        return own
+
+    def linearise(some: Numbers, _: int = 0) -> list[Normal]:
+        return [_linearised(outlines, all_of(some), free)]
+
+    first = linearise(np.zeros((1, int(free.sum()))))
+    found = unmoved(first, prior, tau)
+    if found is None:
+        body, shares = common(outlines, _PLACES)
+
+        def gauge(some: Numbers) -> Numbers:
+            own = all_of(some)
+            own[:, PLACE] -= (body @ (shares @ own[:, PLACE].reshape(-1))).reshape(views, -1)
+            if yaw_sigmas.all():
+                own[:, YAW] -= np.average(own[:, YAW], weights=yaw_sigmas**-2)
+            return own[free][None]
+
+        found = fit(
+            linearise, first, prior, tau, rounds, gauge=gauge, length=LENGTHENED, enough=ENOUGH
+        )
+    return replace(found, numbers=all_of(found.numbers))
 
 
 def move_camera(camera: Camera, square: Square, own: Float[np.ndarray, " 4"]) -> Camera:
@@ -113,52 +107,22 @@ def displace_camera(camera: Camera, square: Square, own: Float[np.ndarray, " 3"]
     return replace(camera, center=center, scale=camera.scale * growth)
 
 
-def _deviations(yaw_sigmas: Float[np.ndarray, " views"], tau: float) -> Float[np.ndarray, " m"]:
-    """Return every number's standard deviation before the outlines are looked at."""
-    own = np.zeros((len(yaw_sigmas), OWN))
-    own[:, PLACE] = tau * np.sqrt(np.diag(_PLACES.covariance))
-    own[:, YAW] = yaw_sigmas
-    return own.reshape(-1)
-
-
-def _improved(normal: _Normal, deviation: np.ndarray, flat: np.ndarray) -> np.ndarray:
-    """Return the numbers after a step of Gauss-Newton, in units in which priors are standard."""
-    unit = np.divide(flat, deviation, out=np.zeros_like(flat), where=deviation > 0)
-    matrix = deviation[:, None] * normal.matrix * deviation + np.eye(len(flat))
-    step = np.linalg.solve(matrix, deviation * normal.slope + unit)
-    return deviation * (unit - LENGTHENED * step)
-
-
-def _learned(matrix: np.ndarray, deviation: np.ndarray, flat: np.ndarray, tau: float) -> float:
-    """Return the size of placing errors, by the numbers and their uncertainty."""
-    spread = np.linalg.inv(deviation[:, None] * matrix * deviation + np.eye(len(flat)))
-    place = np.arange(len(flat)).reshape(-1, OWN)[:, PLACE].reshape(-1)
-    unit = flat[place] / deviation[place]
-    energy = float(unit @ unit + np.diag(spread)[place].sum())
-    return float(np.clip(tau * np.sqrt(energy / len(place)), LEAST, MOST))
-
-
-def _log_volume(matrix: np.ndarray, deviation: np.ndarray) -> float:
-    """Return log det(1 + D H D): what the determined numbers cost."""
-    whole = np.eye(len(matrix)) + deviation[:, None] * matrix * deviation
-    return float(np.linalg.slogdet(whole)[1])
-
-
-def _linearised(outlines: Outlines, flat: np.ndarray, free: Bool[np.ndarray, " m"]) -> _Normal:
-    """Return the normal equations at `flat`; numbers that are not free have no slope."""
-    own = flat.reshape(-1, OWN)
+def _linearised(
+    outlines: Outlines, own: Float[np.ndarray, "views 4"], free: Bool[np.ndarray, "views 4"]
+) -> Normal:
+    """Return the normal equations of the free numbers at `own`."""
     views = tuple(
         replace(view, camera=move_camera(view.camera, view.square, numbers))
         for view, numbers in zip(outlines.views, own, strict=True)
     )
     aside = [
         _aside(view, numbers, movable)
-        for view, numbers, movable in zip(outlines.views, own, free.reshape(-1, OWN), strict=True)
+        for view, numbers, movable in zip(outlines.views, own, free, strict=True)
     ]
     placed = Placed.of(replace(outlines, views=views), _PLACES, np.zeros((len(views), 3)))
     size = outlines.size_px
     sigma = max(NOISE * size, NOISE_PX)
-    matrix, slope = np.zeros((len(flat), len(flat))), np.zeros(len(flat))
+    matrix, slope = np.zeros((own.size, own.size)), np.zeros(own.size)
     cost = squares = 0.0
     points = 0
     for view, outline in enumerate(views):
@@ -168,14 +132,14 @@ def _linearised(outlines: Outlines, flat: np.ndarray, free: Bool[np.ndarray, " m
             if other == view:
                 continue
             residual, jacobian = _pair(views, aside, view, other, found)
-            tame = 1 + (residual / (FOREIGN * size)) ** 2
-            weight = 1 / (tame * sigma) ** 2 / CORRELATED
+            weight, own_cost = weighed(residual, sigma, size)
             used = _columns(view, other)
             matrix[np.ix_(used, used)] += jacobian.T @ (weight[:, None] * jacobian)
             slope[used] += jacobian.T @ (weight * residual)
-            cost += float((residual**2 / tame).sum()) / sigma**2 / CORRELATED
+            cost += own_cost
             squares += float((residual**2).sum())
-    return _Normal(matrix, slope, cost, (squares / max(1, points)) ** 0.5)
+    used = free.reshape(-1)
+    return Normal(matrix[np.ix_(used, used)], slope[used], cost, squares, points)
 
 
 Aside = list[tuple[Camera, Camera] | None]

@@ -9,7 +9,7 @@ drawing's displacement d, by Gauss-Newton:
 
 D is the signed distance to the drawing's outline, o the way across a step to the line that the
 artist drew there. tau, the size of the drawings' errors, and whether there are any, come from the
-marginal likelihood, as in `toonset.dataset.silhouettes.register`.
+marginal likelihood, as in `toonset.dataset.silhouettes.empirical_bayes`.
 """
 
 from __future__ import annotations
@@ -21,16 +21,8 @@ import numpy as np
 from jaxtyping import Float
 
 from toonset.dataset.silhouettes.displacement import Bends
+from toonset.dataset.silhouettes.empirical_bayes import Fit, Normal, Numbers, Prior, fit, weighed
 from toonset.dataset.silhouettes.outlines import Outline
-from toonset.dataset.silhouettes.register import (
-    CORRELATED,
-    FOREIGN,
-    SETTLED,
-    Fit,
-    energy,
-    learn_error_size,
-    log_volume,
-)
 from toonset.nerf.look.step_lines import lines_across
 
 NOISE, NOISE_PX = 0.001, 0.1  # of the square, but at least so many pixels: a known shape's error
@@ -72,17 +64,6 @@ class InnerLines:
         return off / self.size - self.beyond
 
 
-@dataclass(frozen=True, eq=False)
-class _Normal:
-    """A drawing's normal equations: H, gradient/2, cost; squared distances and their number."""
-
-    matrix: Float[np.ndarray, "k k"]
-    slope: Float[np.ndarray, " k"]
-    cost: float
-    squares: float
-    points: int
-
-
 def fit_bends(
     drawn: Sequence[Outline],
     shapes: Sequence[Outline],
@@ -97,46 +78,19 @@ def fit_bends(
         lines: within the figures, one per drawing; None: outlines alone.
         start: displacements to begin with; None: none.
     """
-    views = range(len(drawn))
-    precision = np.linalg.inv(_BENDS.covariance)
-    count = len(precision)
-    numbers = np.zeros((len(drawn), count)) if start is None else start.numbers
-    tau = EXPECTED if start is None else start.tau
-    none = np.zeros(count)
+    prior = Prior(np.linalg.inv(_BENDS.covariance))
 
-    def normals(at: Float[np.ndarray, "views k"], reach: float) -> list[_Normal]:
-        return [
-            _normal(drawn[i], shapes[i], lines[i] if lines else None, at[i], reach) for i in views
-        ]
-
-    first = normals(np.tile(none, (len(drawn), 1)), FARTHEST)
-    normal = first if start is None else normals(numbers, FARTHEST)
-    for round_ in range(1, ROUNDS + 1):
-        numbers = np.stack(
-            [
-                own
-                - np.linalg.solve(n.matrix + precision / tau**2, n.slope + precision @ own / tau**2)
-                for own, n in zip(numbers, normal, strict=True)
-            ]
-        )
+    def linearise(at: Numbers, round_: int) -> list[Normal]:
         reach = max(NEAREST, FARTHEST * (1 - round_ / ROUNDS))
-        normal = normals(numbers, reach)
-        if round_ >= SETTLED:
-            spent = sum(
-                energy(n.matrix, precision, own, tau)
-                for own, n in zip(numbers, normal, strict=True)
-            )
-            tau = learn_error_size(spent, numbers.size)
-    gain = 0.0
-    for own, before, after in zip(numbers, first, normal, strict=True):
-        paid = after.cost + own @ precision @ own / tau**2
-        gain += (before.cost - paid - log_volume(after.matrix, _BENDS.covariance * tau**2, 1)) / 2
-    return Fit(numbers, tau, float(gain), (_mean(first), _mean(normal)))
+        inner: Sequence[InnerLines | None] = lines or [None] * len(drawn)
+        views = zip(drawn, shapes, inner, at, strict=True)
+        return [_normal(*view, reach) for view in views]
 
-
-def _mean(normals: Sequence[_Normal]) -> float:
-    points = sum(normal.points for normal in normals)
-    return float(np.sqrt(sum(normal.squares for normal in normals) / max(1, points)))
+    first = linearise(np.zeros((len(drawn), len(prior.precision))), 0)
+    if start is None:
+        return fit(linearise, first, prior, EXPECTED, ROUNDS)
+    begin = (start.numbers, linearise(start.numbers, 0))
+    return fit(linearise, first, prior, start.tau, ROUNDS, start=begin)
 
 
 def _normal(
@@ -145,7 +99,7 @@ def _normal(
     lines: InnerLines | None,
     numbers: Float[np.ndarray, " k"],
     reach: float,
-) -> _Normal:
+) -> Normal:
     size = drawn.square.size
     jacobian = _BENDS.jacobian(drawn.square.unit(shape.points))
     distance, *slope = drawn.at(shape.points + size * jacobian @ numbers)
@@ -159,13 +113,8 @@ def _normal(
         jacobian = np.concatenate([jacobian, inner[there]])
         across = np.concatenate([across, lines.across[there]])
     sigma = max(NOISE * size, NOISE_PX)
-    tame = 1 + (distance / (FOREIGN * size)) ** 2
-    weight = 1 / (tame * sigma) ** 2 / CORRELATED
+    weight, cost = weighed(distance, sigma, size)
     way = size * np.einsum("nd,ndk->nk", across, jacobian)
-    return _Normal(
-        way.T @ (weight[:, None] * way),
-        way.T @ (weight * distance),
-        float((distance**2 / tame).sum()) / sigma**2 / CORRELATED,
-        squares,
-        points,
+    return Normal(
+        way.T @ (weight[:, None] * way), way.T @ (weight * distance), cost, squares, points
     )

@@ -29,10 +29,12 @@ from typing import Any
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float
+from scipy.linalg import block_diag
 
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.silhouettes.displacement import CONTROLS, Bends
+from toonset.dataset.silhouettes.empirical_bayes import step
 from toonset.dataset.silhouettes.mask import mask_of
 from toonset.nerf.look.outline import outline_width
 from toonset.nerf.prepare.unwarp import Warp, warped
@@ -262,19 +264,17 @@ def _agreed(
     k = 2 * _HALF
     prior = np.linalg.inv(_BENDS.covariance) / EXPECTED**2
     priors = [prior + figure.held() for figure in figures]
+    precision = block_diag(*priors)
     numbers, gain = begin, 0.0
     for blur in BLURS:
         layers = [_slopes(figure.paint, blur * figure.height_px) for figure in figures]
         for _ in range(ROUNDS):
             matrix, slope = np.zeros((len(figures) * k,) * 2), np.zeros(len(figures) * k)
-            for i, own in enumerate(priors):
-                at = slice(i * k, (i + 1) * k)
-                matrix[at, at] += own
-                slope[at] += own @ (numbers[i] - begin[i])
             for pair in pairs:
                 _add(matrix, slope, pair, layers, numbers)
-            step = np.linalg.solve(matrix, slope).reshape(len(figures), k)
-            numbers = [old - new for old, new in zip(numbers, step, strict=True)]
+            off = np.concatenate(numbers) - np.concatenate(begin)
+            moves = step(matrix, slope, precision, off).reshape(len(figures), k)
+            numbers = [old - move for old, move in zip(numbers, moves, strict=True)]
         gain = (_cost(layers, pairs, begin) - _cost(layers, pairs, numbers)) / 2
     moved = [after - old for after, old in zip(numbers, begin, strict=True)]
     spent = sum(float(d @ own @ d) for d, own in zip(moved, priors, strict=True))

@@ -15,9 +15,9 @@ import numpy as np
 from jaxtyping import Float
 
 from toonset.dataset.bundle.scene import Frame, Scene
+from toonset.dataset.silhouettes.empirical_bayes import Fit
 from toonset.dataset.silhouettes.mask import alpha_of, figure_px, has_figure
 from toonset.dataset.silhouettes.outlines import OUTLINE_POINTS, ROOM, Outlines, Square
-from toonset.dataset.silhouettes.register import Fit
 from toonset.nerf.hull.hull import LEVEL
 from toonset.nerf.hull.mannequin_fit import MannequinFit, mannequin_fit, paired, parts_left
 from toonset.nerf.hull.mannequin_shape import FINER, Shape, ShapeView, shape_of
