@@ -3,15 +3,18 @@
 A file says what it is in `schema` (see `toonset.read`): readers ignore keys that they do not
 know, for later versions may add some. A camera is the exception: a number more could change where
 it looks, so its keys must all be known.
+
+A dataclass whose fields are annotated with what a file may hold is its own record: it is a field of
+the file's, and pydantic reads and writes it.
 """
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from toonset.errors import BundleError, one_line
 from toonset.read import parse_json, read_whole
@@ -20,6 +23,12 @@ MAX_JSON_BYTES = 32 * 2**20
 MOST_PROBLEMS = 20  # of one file; the rest is counted
 # Of a file that a person writes: a key that is not known is a slip
 STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+
+LARGEST = 1e9  # world units, pixels, and pixels per unit either way: float32 still tells
+Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+Size = Annotated[float, Field(ge=1 / LARGEST, le=LARGEST)]
+Share = Annotated[float, Field(ge=0, le=1)]
+Byte = Annotated[int, Field(ge=0, le=255)]
 
 Record = TypeVar("Record", bound=BaseModel)
 
@@ -76,6 +85,8 @@ def _problems(error: ValidationError, most: int) -> list[str]:
 
 def _problem(path: tuple[object, ...], message: str) -> str:
     place = ".".join(str(part)[:60] for part in path)
-    plain = re.sub(r" or instance of \w+| after validation|^Value error, ", "", message)
+    plain = re.sub(r" or (an )?instance of \w+| after validation|^Value error, ", "", message)
     plain = re.sub("tuple|array", "list", plain.replace("Tuple", "List"))
+    if plain == "Unexpected keyword argument":  # of a dataclass
+        plain = "Extra inputs are not permitted"
     return one_line(f"field {place}: {plain}" if place else f"the whole: {plain}")

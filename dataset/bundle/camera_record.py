@@ -10,8 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from toonset.camera import Camera
 from toonset.dataset.images.picture import MAX_PIXELS
 from toonset.errors import BundleError
-
-LARGEST = 1e9  # world units, pixels, and pixels per unit either way: float32 still tells
+from toonset.json_file import LARGEST
 
 Row = Annotated[list[float], Field(min_length=3, max_length=3)]
 Rotation = Annotated[list[Row], Field(min_length=3, max_length=3)]

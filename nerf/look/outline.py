@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
+from pydantic import Field
 from skimage.measure import find_contours
 
 from toonset.dataset.silhouettes.mask import mask_of
+from toonset.json_file import Byte
 from toonset.palette.pixels.ink_lines import lightness_of, outline_line_px
 from toonset.raster import depth_inside, depth_near_edge, nearest, sized_parts
 
@@ -27,6 +30,9 @@ CRUMB_AT = 260.0
 BESIDE_PX = 4  # round an outline: enlarging by cubic curves reaches two pixels
 BAND_PX = 2.0  # beyond the outline, in which its soft side lies
 
+LONGEST_PX = 4096.0  # a displacement, or how wide a line is, in files
+Width = Annotated[float, Field(ge=0, le=LONGEST_PX)]
+
 Picture = UInt8[np.ndarray, "height width 4"]
 
 
@@ -39,8 +45,8 @@ class Outline:
         width_px: pixels of the drawings.
     """
 
-    rgb: tuple[int, int, int]
-    width_px: float
+    rgb: tuple[Byte, Byte, Byte]
+    width_px: Width
 
 
 def outline_of(drawings: Sequence[Picture]) -> Outline | None:

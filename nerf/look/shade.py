@@ -19,6 +19,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
+from toonset.json_file import Number, Share
 from toonset.palette.pixels.shadow import border_votes, find_shadow, find_tones
 from toonset.raster import dilate, nearest
 
@@ -42,9 +43,9 @@ class Shade:
         factor: red, green and blue in shadow over those in light.
     """
 
-    slope: tuple[float, float, float]
-    level: float
-    factor: tuple[float, float, float]
+    slope: tuple[Number, Number, Number]
+    level: Number
+    factor: tuple[Share, Share, Share]
 
     def logit(self, normal: Normals) -> Float[np.ndarray, "height width"]:
         """Return the logarithm of how much likelier shadow is than light."""

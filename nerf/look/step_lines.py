@@ -8,12 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float
+from pydantic import Field
 from scipy.ndimage import map_coordinates
 
+from toonset.nerf.look.outline import Width
 from toonset.raster import quick_distance_to
 
 STEPS = (0.01, 0.015, 0.02, 0.025, 0.03, 0.035, 0.04, 0.05, 0.06, 0.08)  # of the figure's height
@@ -45,9 +48,9 @@ class StepLines:
         far_px: how far onto the hidden side.
     """
 
-    least: float
-    near_px: float
-    far_px: float
+    least: Annotated[float, Field(gt=0, le=1)]
+    near_px: Width
+    far_px: Width
 
     @property
     def width_px(self) -> float:

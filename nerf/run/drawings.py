@@ -33,9 +33,10 @@ from toonset.camera import Camera
 from toonset.dataset.bundle.camera_record import NativeCamera
 from toonset.dataset.images.picture import MAX_PIXELS, encode_png, load_rgba
 from toonset.errors import BundleError, CameraError
+from toonset.json_file import Byte, Number, Share, Size
 from toonset.nerf.hull.mannequin_shape import MOST_FACES, MOST_STEPS, Shape
 from toonset.nerf.look.drawings import Drawing, Drawings, Original, PairFlow
-from toonset.nerf.look.outline import Outline
+from toonset.nerf.look.outline import LONGEST_PX, Outline
 from toonset.nerf.look.shade import Shade
 from toonset.nerf.look.step_lines import StepLines
 from toonset.palette.palette import Shadow
@@ -45,25 +46,11 @@ from toonset.write import write_bytes
 PICTURES, PAINT, SURFACES = "drawings.png", "paint.png", "drawings.safetensors"
 ORIGINALS = "originals.png"
 MAX_BYTES = 512 * 2**20
-LONGEST_PX = 4096.0  # a displacement, or how wide a line is
 MOST_VIEWS = 4096
-Byte = Annotated[int, Field(ge=0, le=255)]
 Color = tuple[Byte, Byte, Byte]
-Width = Annotated[float, Field(ge=0, le=LONGEST_PX)]
-Number = Annotated[float, Field(ge=-1e9, le=1e9)]
-Size = Annotated[float, Field(ge=1e-9, le=1e9)]
-Share = Annotated[float, Field(ge=0, le=1)]
 Light = Annotated[float, Field(ge=-0.1, le=1.2)]  # of OKLab; dark ends may lie a little below 0
 Hue = Annotated[float, Field(ge=-1, le=1)]  # a or b of OKLab
 Count = Annotated[int, Field(ge=0, lt=MOST_VIEWS)]
-
-
-class OutlineRecord(BaseModel):
-    """The line round the figures; fields as in `Outline`."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
-    rgb: Color
-    width_px: Width
 
 
 class PairRecord(BaseModel):
@@ -82,26 +69,8 @@ class OriginalRecord(BaseModel):
     camera: NativeCamera
 
 
-class StepsRecord(BaseModel):
-    """Lines at steps in depth; fields as in `StepLines`."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
-    least: float = Field(gt=0, le=1)
-    near_px: Width
-    far_px: Width
-
-
-class ShadeRecord(BaseModel):
-    """A shadow; fields as in `Shade`."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
-    slope: tuple[Number, Number, Number]
-    level: Number
-    factor: tuple[Share, Share, Share]
-
-
 class ShadowRecord(BaseModel):
-    """The shadow of the drawings' palette; fields as in `Shadow`."""
+    """The shadow of the drawings' palette; fields as in `Shadow`, which palette.json rounds."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
     factor: tuple[Share, Share, Share]
@@ -150,17 +119,17 @@ class LimbsRecord(BaseModel):
 class DrawingsRecord(BaseModel):
     """Record of `Drawings` in config.json."""
 
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, revalidate_instances="always")
     cameras: list[NativeCamera] = Field(min_length=1, max_length=MOST_VIEWS)
     pairs: list[PairRecord] = Field(max_length=MOST_VIEWS)
-    outline: OutlineRecord | None
+    outline: Outline | None
     palette: list[Color] = Field(min_length=1, max_length=254)
     height: Size
     depths: tuple[Number, Number]
     bent: bool
     shape: ShapeRecord | None
-    steps: StepsRecord | None
-    shade: ShadeRecord | None
+    steps: StepLines | None
+    shade: Shade | None
     shadow: ShadowRecord | None = None
     ramps: list[RampRecord] = Field(default=[], max_length=254)
     limbs: list[LimbsRecord] = Field(default=[], max_length=MOST_VIEWS)
@@ -170,20 +139,20 @@ class DrawingsRecord(BaseModel):
     @classmethod
     def of(cls, drawings: Drawings) -> DrawingsRecord:
         """Return the record of drawings."""
-        line, shape = drawings.outline, drawings.shape
+        shape = drawings.shape
         pairs = [{"pair": f.pair, "camera": NativeCamera.of(f.camera)} for f in drawings.flows]
         return cls.model_validate(
             {
                 "cameras": [NativeCamera.of(view.camera) for view in drawings.views],
                 "pairs": pairs,
-                "outline": line and {"rgb": line.rgb, "width_px": line.width_px},
+                "outline": drawings.outline,
                 "palette": drawings.palette.tolist(),
                 "height": drawings.height,
                 "depths": drawings.depths,
                 "bent": drawings.bent,
                 "shape": shape and _where(shape),
-                "steps": drawings.steps and asdict(drawings.steps),
-                "shade": drawings.shade and asdict(drawings.shade),
+                "steps": drawings.steps,
+                "shade": drawings.shade,
                 "shadow": drawings.shadow and asdict(drawings.shadow),
                 "ramps": [
                     {"stops": one.stops.tolist(), "light": one.light, "spread": one.spread}
@@ -281,19 +250,18 @@ def read_drawings(folder: Path, record: DrawingsRecord) -> Drawings:
         )
         for i, (camera, own, flat, level) in enumerate(parts)
     )
-    line = None if record.outline is None else Outline(**record.outline.model_dump())
     return Drawings(
         views,
         tuple(flows),
-        line,
-        line,
+        record.outline,
+        record.outline,
         np.array(record.palette, dtype=np.uint8),
         record.height,
         record.depths,
         record.bent,
         shape,
-        None if record.steps is None else StepLines(**record.steps.model_dump()),
-        None if record.shade is None else Shade(**record.shade.model_dump()),
+        record.steps,
+        record.shade,
         None if record.shadow is None else Shadow(**record.shadow.model_dump()),
         tuple(Ramp(np.array(one.stops), one.light, one.spread) for one in record.ramps),
     )

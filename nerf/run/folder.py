@@ -24,9 +24,8 @@ import torch
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from safetensors.torch import save
 
-from toonset.dataset.bundle.camera_record import LARGEST
 from toonset.errors import BundleError, UsageError
-from toonset.json_file import read_json, validation_reason
+from toonset.json_file import LARGEST, Number, Size, read_json, validation_reason
 from toonset.nerf.fields.classifier import PaletteClassifier
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.fields.triplane import TriplaneField
@@ -38,8 +37,6 @@ from toonset.nerf.run.drawings import (
     PICTURES,
     SURFACES,
     DrawingsRecord,
-    Number,
-    Size,
     load_tensors,
     read_drawings,
     write_drawings,
