@@ -25,9 +25,10 @@ from toonset.calib.fit.model_selection import (
 from toonset.calib.options import VerdictThresholds
 from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.outline.occluding_contour import Surface, prepare_surface
-from toonset.calib.result import Alternative, Calibration, Sigmas, Verdict, ViewCalibration
+from toonset.calib.result import Alternative, Calibration, Sigmas, ViewCalibration
 from toonset.calib.search.candidates import is_twin
 from toonset.calib.verdict.judge import angle_sigmas, judge_sheet, outlines_apart
+from toonset.dataset.bundle.calibration_schema import Verdict
 from toonset.dataset.mannequin.landmark_file import Landmarks
 from toonset.dataset.silhouettes.contour import drawn_contour
 from toonset.errors import LandmarkError

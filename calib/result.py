@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -13,12 +13,11 @@ from toonset.calib.fit.drawing_error import Noise
 from toonset.calib.fit.landmarks import LandmarkFit
 from toonset.calib.fit.model_selection import ModelChoice
 from toonset.camera import Camera
+from toonset.dataset.bundle.calibration_schema import FilledHole, Side, Verdict
 from toonset.mesh import Mesh
-from toonset.view import Box, View
+from toonset.view import View
 
-Side = Literal["left", "top", "right", "bottom"]
 SIDES: tuple[Side, ...] = ("left", "top", "right", "bottom")  # as in a view's ends
-Verdict = Literal["ok", "weak", "ambiguous", "failed"]
 SEVERITY: tuple[Verdict, ...] = ("ok", "weak", "ambiguous", "failed")
 
 
@@ -117,29 +116,6 @@ class CutOff:
         lost = f"about {self.lost_px:.0f} px are missing"
         ends = "" if self.flat.at_edge else "; the picture ends there now"
         return f"{self.view}: the figure is cut off at the {self.flat.side}, {lost}{ends}"
-
-
-@dataclass(frozen=True)
-class FilledHole:
-    """A false hole: paint in the paper's colour.
-
-    Attributes:
-        view: the drawing that has it.
-        box: (x, y, width, height) in that drawing, pixels.
-        by: the drawing that contradicts it.
-    """
-
-    view: str
-    box: Box
-    by: str
-
-    def __str__(self) -> str:
-        """Return what was done, for people."""
-        x, y, width, height = self.box
-        return (
-            f"{self.view}: the hole at {x}, {y} ({width} x {height} px) is paint: {self.by}, drawn "
-            "from the other side, shows none; filled"
-        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,8 +18,9 @@ from jaxtyping import Bool, UInt8
 
 from toonset.calib.outline.occluding_contour import Surface, mask_at
 from toonset.calib.outline.pose import Pose, project
-from toonset.calib.result import SIDES, Calibration, FlatSide, Side, ViewCalibration
+from toonset.calib.result import SIDES, Calibration, FlatSide, ViewCalibration
 from toonset.camera import Camera
+from toonset.dataset.bundle.calibration_schema import Side
 from toonset.view import NO_ENDS, VISIBLE, View
 
 OPPOSITE: dict[Side, Side] = {"bottom": "top", "top": "bottom", "left": "right", "right": "left"}

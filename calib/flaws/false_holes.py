@@ -17,8 +17,9 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
-from toonset.calib.result import FilledHole, ViewCalibration
+from toonset.calib.result import ViewCalibration
 from toonset.camera import Camera
+from toonset.dataset.bundle.calibration_schema import FilledHole
 from toonset.dataset.split.background import difference
 from toonset.dataset.split.holes import CLEAR, LEAST_HOLE_PX
 from toonset.raster import dilate, parts, sized_parts

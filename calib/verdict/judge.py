@@ -13,9 +13,10 @@ from toonset.calib.fit.align import Fit, measure
 from toonset.calib.fit.sheet_adjustment import JointFit
 from toonset.calib.outline.correspondences import Drawing
 from toonset.calib.outline.pose import PARAMETERS, Pose
-from toonset.calib.result import SEVERITY, Alternative, Sigmas, Verdict, ViewCalibration
+from toonset.calib.result import SEVERITY, Alternative, Sigmas, ViewCalibration
 from toonset.calib.search.candidates import OTHER, is_twin
 from toonset.camera import angles_from_rotation, rotation_distance
+from toonset.dataset.bundle.calibration_schema import Verdict
 from toonset.view import View
 
 SIDEWAYS = np.sin(np.radians(20.0))  # of the cosine of yaw: seen from the side

@@ -8,7 +8,7 @@ from typing import Any
 
 from toonset.calib.result import Calibration, ViewCalibration
 from toonset.camera import Camera
-from toonset.dataset.bundle.calibration_schema import SCHEMA, VERSION
+from toonset.dataset.bundle.calibration_schema import SCHEMA, VERSION, CalibratedCamera
 
 FACING = math.radians(60.0)  # of yaw: what is turned away farther shows hardly any of a side
 FROM_ABOVE = math.radians(50.0)  # sheets look down by 35 degrees at most (docs/decisions.md)
@@ -166,17 +166,4 @@ def _view_dict(view: ViewCalibration) -> dict[str, Any]:
 
 
 def _camera_dict(camera: Camera) -> dict[str, Any]:
-    yaw, elevation, roll = (math.degrees(angle) for angle in camera.angles)
-    return {
-        "model": "orthographic" if camera.is_orthographic else "pinhole",
-        "yaw_deg": yaw,
-        "elevation_deg": elevation,
-        "roll_deg": roll,
-        "camera_from_world_rotation": camera.rotation.tolist(),
-        "target": camera.target.tolist(),
-        "scale_px_per_unit": camera.scale,
-        "pixel_aspect": camera.pixel_aspect,
-        "center_px": camera.center.tolist(),
-        "k": camera.k,
-        "size_wh": list(camera.size_wh),
-    }
+    return CalibratedCamera.of(camera).model_dump(mode="json")

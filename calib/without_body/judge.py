@@ -15,13 +15,14 @@ from toonset.calib.evidence.coherence_state import SheetState
 from toonset.calib.fit.drawing_error import Noise
 from toonset.calib.fit.model_selection import ORTHOGRAPHIC, SHARED, ModelChoice
 from toonset.calib.options import CalibrationOptions, VerdictThresholds
-from toonset.calib.result import Alternative, Calibration, Sigmas, Verdict, ViewCalibration
+from toonset.calib.result import Alternative, Calibration, Sigmas, ViewCalibration
 from toonset.calib.verdict.checks import OF_DRAWINGS, JudgedSheet, apply_checks
 from toonset.calib.verdict.judge import judge_sheet
 from toonset.calib.without_body.placing import NOT_PLACED, Figures, SheetCameras
 from toonset.calib.without_body.posterior import ErrorProbabilities, doubts, label_doubt, view_doubt
 from toonset.calib.without_body.turns import NEAR, STARTS, TurnHypotheses, wrapped
 from toonset.camera import Camera, rotation_from_angles
+from toonset.dataset.bundle.calibration_schema import Verdict
 from toonset.dataset.silhouettes.coherence import ViewCoherence, coherence
 from toonset.dataset.split_folder.view_labels import Label
 from toonset.view import View

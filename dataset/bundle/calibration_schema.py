@@ -6,6 +6,8 @@ ignored on reading (within a major version keys may be added), except in a camer
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -16,12 +18,14 @@ from toonset.dataset.bundle.camera_record import NativeCamera, Pair, Rotation, R
 from toonset.dataset.bundle.transforms_schema import MAX_FRAMES
 from toonset.errors import BundleError
 from toonset.palette.palette import Hex
+from toonset.view import Box
 
 SCHEMA, VERSION = "toonset-calibration", 2
 SAME_ANGLE_DEG = 1e-3
 ROUNDING = 1e-6  # of a covariance, relative to its largest number
 
 Verdict = Literal["ok", "weak", "ambiguous", "failed"]
+Side = Literal["left", "top", "right", "bottom"]
 Probability = Annotated[float, Field(ge=0, le=1 + 1e-6)]  # sums of probabilities round
 Spread = Annotated[float, Field(ge=0)]
 Text = Annotated[str, Field(max_length=10_000)]
@@ -47,6 +51,24 @@ class CalibratedCamera(_Record):
     center_px: Pair
     k: float
     size_wh: tuple[int, int]
+
+    @classmethod
+    def of(cls, camera: Camera) -> CalibratedCamera:
+        """Return the record of a camera."""
+        yaw, elevation, roll = (math.degrees(angle) for angle in camera.angles)
+        return cls(
+            model="orthographic" if camera.is_orthographic else "pinhole",
+            yaw_deg=yaw,
+            elevation_deg=elevation,
+            roll_deg=roll,
+            camera_from_world_rotation=camera.rotation.tolist(),
+            target=camera.target.tolist(),
+            scale_px_per_unit=camera.scale,
+            pixel_aspect=camera.pixel_aspect,
+            center_px=camera.center.tolist(),
+            k=camera.k,
+            size_wh=camera.size_wh,
+        )
 
     def camera(self) -> Camera:
         """Return the camera.
@@ -178,19 +200,34 @@ class LandmarkFit(_Record):
     perspective_bic_gain: float
 
 
-class FilledHole(_Record):
-    """A hole in a drawing that another drawing, from the other side, shows to be paint."""
+@dataclass(frozen=True)
+class FilledHole:
+    """A false hole: paint in the paper's colour.
+
+    Attributes:
+        view: the drawing that has it.
+        box: (x, y, width, height) in that drawing, pixels.
+        by: the drawing that contradicts it.
+    """
 
     view: Annotated[str, Field(min_length=1, max_length=255)]
-    box: tuple[int, int, int, int]
+    box: Box
     by: Annotated[str, Field(min_length=1, max_length=255)]
+
+    def __str__(self) -> str:
+        """Return what was done, for people."""
+        x, y, width, height = self.box
+        return (
+            f"{self.view}: the hole at {x}, {y} ({width} x {height} px) is paint: {self.by}, drawn "
+            "from the other side, shows none; filled"
+        )
 
 
 class CutOff(_Record):
     """A part of a figure that its picture lacks: a frame, not in the picture, cut it off."""
 
     view: Annotated[str, Field(min_length=1, max_length=255)]
-    side: Literal["left", "top", "right", "bottom"]
+    side: Side
     lost_px: Spread
 
 
