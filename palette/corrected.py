@@ -25,10 +25,10 @@ from toonset.palette.palette import MOST_TONES, ContourColor, Palette, PaletteCo
 from toonset.palette.pixels.antialias import OPAQUE
 from toonset.palette.pixels.cel_tones import step_tones
 from toonset.palette.pixels.labels import UNLABELLED, Space, nearest_colors
-from toonset.palette.pixels.ramp_labels import Ramp
+from toonset.palette.pixels.ramp_labels import Ramp, plain_ramp, ramp_of
 from toonset.palette.pixels.shadow import apply_shadow
 from toonset.palette.printed import printed_places
-from toonset.palette.shaded import plain_ramp, ramp_of, shaded_labels, with_own_tones
+from toonset.palette.shaded import shaded_labels, with_own_tones
 
 Picture = UInt8[np.ndarray, "height width 4"]
 Map = UInt8[np.ndarray, "height width"]

@@ -32,6 +32,7 @@ from toonset.palette.pixels.ink_lines import find_contours
 from toonset.palette.pixels.labels import UNLABELLED, Space, label_pixels, nearest_labels
 from toonset.palette.pixels.opacity import opaque_inside, see_through_notes
 from toonset.palette.pixels.own_shadows import own_shadow_maps, with_own_shadows
+from toonset.palette.pixels.ramp_labels import ramps_of
 from toonset.palette.pixels.shadow import apply_shadow, find_shadow, find_tones, lit_pictures
 from toonset.palette.pixels.view_gain import gain_notes, view_gains, with_gains
 from toonset.palette.plain_sheets import plain_notes
@@ -40,7 +41,6 @@ from toonset.palette.shaded import (
     find_shaded_palette,
     is_shaded,
     pick_shaded_palette,
-    ramps_of,
     shaded_labels,
 )
 from toonset.raster import dilate, is_uniform

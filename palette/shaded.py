@@ -35,7 +35,14 @@ from toonset.palette.pixels.patches import (
     shrunk,
     smooth_lab,
 )
-from toonset.palette.pixels.ramp_labels import Ramp, enlarged_labels, ramp_labels, savings
+from toonset.palette.pixels.ramp_labels import (
+    OF_SPREAD,
+    Ramp,
+    enlarged_labels,
+    ramp_labels,
+    ramp_of,
+    savings,
+)
 from toonset.raster import dilate, erode
 
 SHADED = 1.05 / 255  # lightness per pixel at `TALL_PX`, the median: less is flat paint
@@ -46,7 +53,6 @@ LEAST_INNER = 0.01  # of the pixels are away from edges, or nobody can tell how 
 QUANTILES = (0.95, 0.75, 0.5, 0.25, 0.05)  # of lightness: a ramp's tones
 AROUND = 0.05  # of a paint's pixels to either side of a quantile are read
 MIDDLE = 2  # of the tones: the paint's own colour
-OF_SPREAD = 2.0  # deviations from a ramp's middle to its ends
 SURE = 0.5  # of a paint's pixels' chances, the mean: less is a guess
 GUESSED = 0.25  # of the pixels: so much of a sheet may be a guess without a word
 
@@ -174,11 +180,6 @@ def shaded_labels(pictures: Sequence[Picture], ramps: Sequence[Ramp]) -> list[Ma
     ]
 
 
-def ramps_of(palette: Palette) -> tuple[Ramp, ...]:
-    """Return the ramps of a painted sheet's palette; none of any other."""
-    return tuple(map(ramp_of, palette.colors)) if palette.has_ramps else ()
-
-
 def with_own_tones(
     colors: Sequence[PaletteColor], pictures: Sequence[Picture], labels: Sequence[Map]
 ) -> list[PaletteColor]:
@@ -194,23 +195,6 @@ def with_own_tones(
             color = replace(color, tones=_tones(light, own, len(label)))
         found.append(color)
     return found
-
-
-def ramp_of(color: PaletteColor) -> Ramp:
-    """Return a palette colour's ramp; of one without tones the ray through black."""
-    if not color.tones:
-        return plain_ramp(np.array(color.rgb, np.uint8))
-    stops = shaded_oklab_from_rgb(np.array([tone.rgb for tone in color.tones], np.uint8))
-    order = np.argsort(stops[:, 0], kind="stable")
-    light = float(shaded_oklab_from_rgb(np.array(color.rgb, np.uint8))[0])
-    spread = float(stops[order[-1], 0] - stops[order[0], 0]) / (2 * OF_SPREAD)
-    return Ramp(stops[order], light, spread)
-
-
-def plain_ramp(rgb: UInt8[np.ndarray, " 3"]) -> Ramp:
-    """Return the ray through black of a colour of which no tones are known."""
-    stop = shaded_oklab_from_rgb(rgb)
-    return Ramp(stop[None], float(stop[0]), 0.0)
 
 
 def _drawing(picture: Picture) -> _Drawing:

@@ -62,6 +62,14 @@ def test_the_import_is_light(line: str) -> None:
     assert done.stdout.strip() == "[]"
 
 
+def test_calibrating_imports_no_torch_no_scipy_and_no_palette_finder_before_their_use() -> None:
+    late = ["torch", "scipy", "toonset.palette.extract", "toonset.palette.shaded"]
+    line = "import toonset as ts; ts.calibrate; ts.split_sheet; ts.write_bundle"
+    code = f"import sys; {line}; print([m for m in {late} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
 def plain(path: Path) -> Any:
     """Return a file's content, JSON without what differs from run to run."""
     if path.suffix != ".json":

@@ -20,10 +20,9 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 from jaxtyping import Float
-from scipy.special import i0e
 
 from toonset.calib.evidence.cylinder import Sections, figure_height, read_sections
-from toonset.calib.evidence.texture import BROKEN
+from toonset.calib.evidence.texture import BROKEN, bessel
 from toonset.view import View
 
 SEARCH_PX = 160  # figure height at which the neck is looked for
@@ -75,7 +74,8 @@ def face_log_likelihood(
     cosine, sine = evidence.natural[index]
     strength = float(np.hypot(cosine, sine))
     wave = cosine * np.cos(yaw) + sine * np.sin(yaw)
-    density = np.exp(wave - strength) / i0e(strength)
+    (mean,) = bessel(np.zeros(1, int), strength)
+    density = np.exp(wave - strength) / mean
     return np.log((1 - BROKEN) * density + BROKEN)
 
 

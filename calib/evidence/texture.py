@@ -20,8 +20,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
-from scipy.special import ive
+from jaxtyping import Float, Int
 
 from toonset.calib.evidence.cylinder import figure_height, read_sections
 from toonset.view import View
@@ -34,6 +33,7 @@ LEAST_PIXELS = 2  # of a cell
 ORDER = 3  # of the Fourier series
 SMOOTHNESS = 1.0  # concentration of the von Mises kernel between longitudes
 ASYMMETRY = 0.1  # variance of what differs between left and right, over that of what does not
+CIRCLE = np.linspace(0, 2 * np.pi, 512, endpoint=False)
 NOISE = 2.0  # variance of a cell over that of the paint: limbs move, cylinders are no bodies
 FAINTEST = 0.02  # OKLab: differences below are not seen, nor drawn on purpose
 # 80 to 100 fit best, whichever of 25 characters is left out; fewer where cameras look steeply down
@@ -115,9 +115,14 @@ def _series(
     orders = np.arange(1, ORDER + 1)
     angles = longitude[:, None] * orders
     waves = np.concatenate([np.ones((len(angles), 1)), np.cos(angles), np.sin(angles)], axis=1)
-    power = 2 * ive(orders, SMOOTHNESS)
+    power = 2 * bessel(orders, SMOOTHNESS)
     unknown_mean = np.array([100.0])
     return waves, np.concatenate([unknown_mean, power, ASYMMETRY * power]) / NOISE
+
+
+def bessel(orders: Int[np.ndarray, " n"], k: float) -> Float[np.ndarray, " n"]:
+    """Return exp(-k) I_n(k): the mean of exp(k (cos t - 1)) cos(n t) over the circle."""
+    return (np.exp(k * (np.cos(CIRCLE) - 1)) * np.cos(orders[:, None] * CIRCLE)).mean(axis=-1)
 
 
 def _cells(

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+import cv2
 import numpy as np
 from jaxtyping import Bool, UInt8
 
@@ -25,6 +26,7 @@ from toonset.view import NO_ENDS, VISIBLE, View
 
 OPPOSITE: dict[Side, Side] = {"bottom": "top", "top": "bottom", "left": "right", "right": "left"}
 
+CROSS = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], np.uint8)
 OPAQUE = 250  # alpha of a pixel that no paper shows through
 SOFT = 0.2  # mixed pixels over the outline's length: of a smooth drawing
 SHORTEST_PX = 3
@@ -42,11 +44,9 @@ def flat_sides(view: View) -> tuple[FlatSide, ...]:
 
 
 def _flat(view: View) -> Iterator[FlatSide]:
-    from scipy.ndimage import binary_erosion
-
     alpha = view.rgba[..., 3]
     mixed = (alpha >= VISIBLE) & (alpha < OPAQUE)
-    inner: Bool[np.ndarray, "height width"] = binary_erosion(view.mask)
+    inner = cv2.erode(view.mask.view(np.uint8), CROSS, borderValue=0) > 0
     is_smooth = mixed.sum() >= SOFT * (view.mask & ~inner).sum()
     sides: tuple[tuple[Side, UInt8[np.ndarray, "rows columns"]], ...] = (
         ("bottom", alpha),

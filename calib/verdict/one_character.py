@@ -20,6 +20,7 @@ FEWEST = 3  # views: front and back alone need not share a colour
 BIN, CHROMA = 0.05, 0.025  # OKLab: of lightness; of a and b
 MOST_CHROMA = 0.35
 BLUR = 1.0  # bins: shadows and paper move a colour a little
+REACH = 4.0  # sigmas of the blur
 OPAQUE = 200  # alpha: fainter are mixed with the paper
 FEWEST_PIXELS = 200  # that lie deeper than the contour's ink; fewer, and ink counts, too
 # Share of colours that two drawings have not in common. The weakest link of 40 sheets of one
@@ -44,8 +45,6 @@ def other_character(drawings: Sequence[View]) -> list[int]:
 
 def _colors(view: View) -> Float[np.ndarray, "lightness a b"]:
     """Return how much of a drawing has which colour, its contour's ink aside; 1 in all."""
-    from scipy.ndimage import gaussian_filter
-
     opaque = view.rgba[..., 3] > OPAQUE
     deep = depth_inside(opaque) > view.line_width_px + 0.5
     if deep.sum() < FEWEST_PIXELS:
@@ -53,5 +52,8 @@ def _colors(view: View) -> Float[np.ndarray, "lightness a b"]:
     lab = oklab_from_rgb(view.rgba[deep][:, :3])
     sides = np.arange(-MOST_CHROMA, MOST_CHROMA + CHROMA / 2, CHROMA)
     counts, _ = np.histogramdd(lab, [np.arange(0, 1 + 1.5 * BIN, BIN), sides, sides])
-    blurred = gaussian_filter(counts, BLUR, mode="constant")
-    return np.asarray(blurred / blurred.sum())
+    for bins in counts.shape:  # along every axis in turn
+        apart = np.abs(np.subtract.outer(np.arange(bins), np.arange(bins))) / BLUR
+        weights = np.where(apart <= REACH, np.exp(-(apart**2) / 2), 0)
+        counts = np.tensordot(counts, weights, axes=(0, 0))
+    return np.asarray(counts / counts.sum())

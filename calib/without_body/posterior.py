@@ -17,7 +17,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import logsumexp
 
 from toonset.calib.evidence.cylinder import figure_height, read_sections
 from toonset.calib.evidence.face import FaceEvidence, drawn_detail, face_log_likelihood, read_faces
@@ -122,7 +121,7 @@ def outlines_log_likelihood(figures: Figures, turns: TurnHypotheses) -> Float[np
         yaws = turns.yaws[rows][0]
         apart = figures.apart(yaws, FEW_ELEVATIONS)
         likely = coherence_log_likelihood(apart, len(yaws), ROUGH)
-        found[rows] = logsumexp(likely + elevation_log_prior(FEW_ELEVATIONS))
+        found[rows] = np.logaddexp.reduce(likely + elevation_log_prior(FEW_ELEVATIONS))
     return found
 
 

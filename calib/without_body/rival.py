@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.special import logit, logsumexp
 
 from toonset.calib.known import Known
 from toonset.calib.options import CalibrationOptions, Progress
@@ -73,6 +72,8 @@ def with_body_or_without(
     elif not given and alone.doubtfulness < found.doubtfulness:
         worse = False
     else:
+        from scipy.special import logit
+
         least = logit(options.thresholds.sure) if given else 0.0
         worse = _odds(cues, alone, found, known) <= least
     if worse:
@@ -97,6 +98,6 @@ def _odds(cues: Cues, one: Calibration, other: Calibration, known: Known) -> flo
     prior = []
     for own in yaws:
         near = (np.abs(wrapped(turns.yaws - own)) <= NEAR).all(axis=1)
-        prior.append(logsumexp(np.append(turns.log_prior[near], elsewhere)))
+        prior.append(np.logaddexp.reduce(np.append(turns.log_prior[near], elsewhere)))
     total = np.array(prior) + cues.evidence.log_likelihood(yaws, outlines)
     return float(total[0] - total[1])

@@ -13,20 +13,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import UInt8
 
 from toonset.dataset.images.picture import encode_grey_png, encode_indexed_png, encode_png
 from toonset.lock import FOLDERS
-from toonset.palette.coverage import coverage_map
-from toonset.palette.extract import PaintMap, paint_maps
-from toonset.palette.formats.registry import encode_palette
 from toonset.palette.names import clean_name
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.labels import Space
-from toonset.palette.swatch_image import draw_swatches
 from toonset.write import check_removable, new_files, write_bytes
+
+if TYPE_CHECKING:
+    from toonset.palette.extract import PaintMap
 
 PALETTE_JSON, SWATCHES = "palette.json", "palette.png"
 COPIES = (".gpl", ".ase", ".hex")  # of the colours, for other programs
@@ -59,6 +59,9 @@ def write_labelled(
 
     Without `maps`, pixels are labelled here.
     """
+    from toonset.palette.coverage import coverage_map
+    from toonset.palette.extract import paint_maps
+
     found = paint_maps(pictures, contours, palette, space) if maps is None else maps
     labels = [(name, one.labels) for name, one in zip(names, found, strict=True)]
     pairs = zip(names, found, strict=True)
@@ -107,6 +110,9 @@ def write_palette(
     Raises:
         OutputError: the folder cannot be written, or a map folder holds what no palette wrote.
     """
+    from toonset.palette.formats.registry import encode_palette
+    from toonset.palette.swatch_image import draw_swatches
+
     folders: dict[str, Maps | Coverages] = {
         "labels": labels,
         "contours": contours,

@@ -27,7 +27,7 @@ from toonset.options import SYMMETRIC, Symmetric
 from toonset.palette.formats.json import read_palette_json
 from toonset.palette.palette import MOST_TONES, Palette
 from toonset.palette.pixels.labels import UNLABELLED
-from toonset.palette.shaded import ramps_of
+from toonset.palette.pixels.ramp_labels import ramps_of
 
 MANNEQUIN, CALIBRATION = "mannequin.obj", "calibration.json"
 Labels = UInt8[np.ndarray, "height width"]

@@ -22,8 +22,7 @@ from toonset.nerf.look.step_lines import StepLines, step_edges
 from toonset.nerf.sections.roles import hull_is_square
 from toonset.palette.palette import Shadow
 from toonset.palette.pixels.labels import nearest_colors
-from toonset.palette.pixels.ramp_labels import Ramp
-from toonset.palette.shaded import plain_ramp
+from toonset.palette.pixels.ramp_labels import Ramp, plain_ramp
 from toonset.raster import depth_inside, distance_to, nearest, sized_parts, taken
 
 STEP = 0.03  # of the figure's height: surfaces so far apart in depth are two

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,8 @@ from toonset.read import parse_json, read_whole, schema_version
 NAME, VERSION = "toonset-palette", 1  # toonset.palette.palette says what may change
 MAX_BYTES = 2**20
 SELDOM = ("sure", "factor")  # of a colour: written where known
-PALETTE = TypeAdapter(Palette)
+
+_palette = cache(lambda: TypeAdapter(Palette))  # not before it is needed: it takes its time
 
 
 def read_json(data: bytes, where: str) -> list[NamedColor]:
@@ -49,7 +51,7 @@ def json_title(data: bytes) -> str:
 
 def to_json(palette: Palette) -> dict[str, Any]:
     """Return the content of palette.json."""
-    content: dict[str, Any] = PALETTE.dump_python(palette, mode="json", by_alias=True)
+    content: dict[str, Any] = _palette().dump_python(palette, mode="json", by_alias=True)
     for key in ("printed", "stepped"):  # written where there are any
         if not content[key]:
             del content[key]
@@ -83,7 +85,7 @@ def palette_of(content: Any, where: str) -> Palette:
             "`toonset palette`"
         )
     try:
-        return PALETTE.validate_json(json.dumps(content), strict=True)
+        return _palette().validate_json(json.dumps(content), strict=True)
     except ValidationError as error:
         raise PaletteError(f"{where}: {validation_reason(error)}") from error
     except PaletteError as error:

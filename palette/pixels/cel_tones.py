@@ -20,7 +20,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
-from scipy.special import log_ndtr
 
 from toonset.palette.names import RGB
 from toonset.palette.palette import MOST_TONES, Palette, PaletteColor, Tone
@@ -35,7 +34,7 @@ from toonset.palette.pixels.labels import (
 from toonset.palette.pixels.own_shadows import factors_of
 from toonset.palette.pixels.ramp_recolor import turned
 from toonset.palette.pixels.recolor import tones_of
-from toonset.palette.pixels.shadow import FLOOR, LINE
+from toonset.palette.pixels.shadow import FLOOR, LINE, coin_bits
 from toonset.raster import dilate, is_uniform, nearest
 
 LEAST_DROP, MOST_DROP = 0.06, 0.8  # logarithms, the channels' mean, from one tone to the next
@@ -248,7 +247,7 @@ def _bits(
     """Return the bits that one side saves over the borders of pairs, a coin in every drawing."""
     coins = lengths >= LEAST_PX / 2
     sides = (nets / np.maximum(lengths, 1))[coins]
-    return float(-log_ndtr(-sides.sum() / np.sqrt(max(len(sides), 1))) / np.log(2) - 1)
+    return coin_bits(float(sides.sum() / np.sqrt(max(len(sides), 1))))
 
 
 def _chains(

@@ -18,7 +18,6 @@ from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
-from scipy.special import log_ndtr
 
 from toonset.palette.names import RGB
 from toonset.palette.options import MAX_COLORS
@@ -30,7 +29,7 @@ from toonset.palette.pixels.labels import (
     nearest_colors,
     nearest_labels,
 )
-from toonset.palette.pixels.shadow import FLOOR, LEAST_PIECE, LINE, apply_shadow
+from toonset.palette.pixels.shadow import FLOOR, LEAST_PIECE, LINE, apply_shadow, coin_bits
 from toonset.raster import sized_parts
 
 SPREAD = 0.1  # logarithms: of paints' factors about the sheet's
@@ -173,7 +172,7 @@ def _sheet_side(labels: Map, dark: Mask) -> float:
 def _side_bits(nets: Sequence[float]) -> float:
     """Return bits that the light's side saves over drawings, each a coin of its border's length."""
     length = float(np.sqrt(np.square(nets).sum()))
-    return float(-log_ndtr(-sum(nets) / length) / np.log(2) - 1) if length else 0.0
+    return coin_bits(sum(nets) / length) if length else 0.0
 
 
 def _united(color: PaletteColor, shades: Sequence[PaletteColor]) -> PaletteColor:

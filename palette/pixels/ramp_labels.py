@@ -17,6 +17,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, UInt8
 
 from toonset.palette.colors import shaded_oklab_from_rgb
+from toonset.palette.palette import Palette, PaletteColor
 from toonset.palette.pixels.antialias import OPAQUE
 from toonset.palette.pixels.labels import UNLABELLED
 from toonset.palette.pixels.patches import DARKEST, Lab, Numbers, Patches
@@ -25,6 +26,7 @@ from toonset.raster import is_uniform
 HUE_SPREAD = 0.007  # in OKLab: of pixels off their ramp
 LIGHT_SPREAD = 0.12  # lightness, at least, of a paint's pixels
 WIDE, LOYAL = 0.5, np.float32(2.0)  # lightness of a paint's patches; what a pixel's patch weighs
+OF_SPREAD = 2.0  # deviations from a ramp's middle to its ends
 MOST = 12.0  # that a pixel costs: it may be what no paint is
 TOGETHER, REACH_PX, STEPS = 3.0, 1.5, 4  # what neighbours weigh, how far, how often
 
@@ -49,6 +51,28 @@ class Ramp:
         hue = np.stack([np.interp(ends, stops[:, 0], stops[:, n]) for n in (1, 2)], axis=-1)
         scale = light / np.maximum(ends, DARKEST)
         return np.asarray(hue * scale[..., None], dtype=np.float32)
+
+
+def ramp_of(color: PaletteColor) -> Ramp:
+    """Return a palette colour's ramp; of one without tones the ray through black."""
+    if not color.tones:
+        return plain_ramp(np.array(color.rgb, np.uint8))
+    stops = shaded_oklab_from_rgb(np.array([tone.rgb for tone in color.tones], np.uint8))
+    order = np.argsort(stops[:, 0], kind="stable")
+    light = float(shaded_oklab_from_rgb(np.array(color.rgb, np.uint8))[0])
+    spread = float(stops[order[-1], 0] - stops[order[0], 0]) / (2 * OF_SPREAD)
+    return Ramp(stops[order], light, spread)
+
+
+def plain_ramp(rgb: UInt8[np.ndarray, " 3"]) -> Ramp:
+    """Return the ray through black of a colour of which no tones are known."""
+    stop = shaded_oklab_from_rgb(rgb)
+    return Ramp(stop[None], float(stop[0]), 0.0)
+
+
+def ramps_of(palette: Palette) -> tuple[Ramp, ...]:
+    """Return the ramps of a painted sheet's palette; none of any other."""
+    return tuple(map(ramp_of, palette.colors)) if palette.has_ramps else ()
 
 
 def ramp_labels(

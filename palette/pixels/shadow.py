@@ -20,7 +20,6 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Float32, UInt8
-from scipy.special import log_ndtr
 
 from toonset.palette.palette import Shadow
 from toonset.palette.pixels.antialias import OPAQUE
@@ -195,7 +194,18 @@ def _direction_bits(
     if not lengths:
         return 0.0
     uneven = abs(sum(lengths)) / np.sqrt(float(np.square(lengths).sum()))
-    return float(-log_ndtr(-uneven) / np.log(2) - 1)
+    return coin_bits(float(uneven))
+
+
+def coin_bits(deviations: float) -> float:
+    """Return the bits that a side of the light saves: coins fall as unevenly that seldom.
+
+    Args:
+        deviations: by which the sides are uneven, of as many flips of a coin.
+    """
+    from scipy.special import log_ndtr
+
+    return float(-log_ndtr(-deviations) / np.log(2) - 1)
 
 
 def find_tones(pictures: Sequence[Picture], contours: Sequence[Map], shadow: Shadow) -> list[Mask]:

@@ -18,14 +18,14 @@ from toonset.palette.paints.ramps import join_patches, moments_of
 from toonset.palette.paints.select import PaletteRule
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.patches import Patches, find_patches, smooth_lab
-from toonset.palette.pixels.ramp_labels import Ramp, savings
+from toonset.palette.pixels.ramp_labels import Ramp, ramps_of, savings
 from toonset.palette.pixels.ramp_recolor import (
     _without_blends,
     find_shaded_mixtures,
     recolor_shaded,
 )
 from toonset.palette.recolor import recolor_drawing
-from toonset.palette.shaded import find_shaded_palette, is_shaded, ramps_of
+from toonset.palette.shaded import find_shaded_palette, is_shaded
 from toonset.raster import erode
 
 SKIN, HAIR, COAT, BELT = (230, 180, 145), (110, 64, 42), (50, 96, 160), (190, 40, 44)

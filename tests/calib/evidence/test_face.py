@@ -45,6 +45,7 @@ def _figure(yaw: float) -> View:
 
 def _sum(evidence: FaceEvidence, yaws: np.ndarray) -> float:
     at = [face_log_likelihood(evidence, i, np.array(yaw)) for i, yaw in enumerate(yaws)]
+    assert all(np.ndim(one) == 0 for one in at)
     return float(np.sum(at))
 
 

@@ -4,11 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import ive
 from scipy.stats import multivariate_normal
 
 from toonset.calib.evidence import texture
 from toonset.calib.evidence.cylinder import figure_height, read_sections
-from toonset.calib.evidence.texture import Paint, paint_evidence, paint_log_likelihood, read_paint
+from toonset.calib.evidence.texture import (
+    Paint,
+    bessel,
+    paint_evidence,
+    paint_log_likelihood,
+    read_paint,
+)
 from toonset.view import View
 
 EIGHT = np.arange(8) * np.pi / 4
@@ -117,6 +124,12 @@ def test_series_is_a_von_mises_kernel_without_asymmetry(monkeypatch: pytest.Monk
     apart = longitude[:, None] - longitude
     expected = np.exp(texture.SMOOTHNESS * (np.cos(apart) - 1))
     np.testing.assert_allclose(kernel - kernel[0, 0], expected - expected[0, 0], atol=1e-12)
+
+
+@pytest.mark.parametrize("k", [0.0, 1.0, 30.0, 700.0])
+def test_a_mean_over_the_circle_is_a_bessel_function(k: float) -> None:
+    orders = np.arange(4)
+    np.testing.assert_allclose(bessel(orders, k), ive(orders, k), rtol=1e-12, atol=1e-16)
 
 
 def test_across_runs_from_edge_to_edge() -> None:
