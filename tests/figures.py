@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 import trimesh
 
-from toonset.calib.outline.occluding_contour import silhouette_mask
+from toonset.dataset.mesh.rasterize import silhouette_mask
 from toonset.mesh import Mesh
 from toonset.view import View
 

@@ -1,4 +1,4 @@
-"""Find the mannequin's occluding contour and silhouette mask from any direction, without OpenGL.
+"""Find the mannequin's occluding contour and mask from any direction, without OpenGL.
 
 A contour generator is an edge whose two faces lie on one side of it in the image (or an edge of an
 open surface). Its points on the outer silhouette are kept by a low-resolution mask. In the image an
@@ -10,10 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cache
-from typing import Any
 
-import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
@@ -24,7 +21,6 @@ from toonset.calib.outline.mesh_edges import prepare_surface as prepare_surface
 from toonset.calib.outline.pose import Pose, project
 
 OUTSIDE_PX = 0.75  # beside a straight outline the pixel there is background, however it lies
-FAR = 9.0  # depth that means "nothing here" in the rasteriser
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,23 +34,6 @@ class OccludingContour:
 
     points: Float[np.ndarray, "n 3"]
     normals: Float[np.ndarray, "n 2"]
-
-
-def silhouette_mask(
-    pixels: Float[np.ndarray, "vertices 2"],
-    faces: Int[np.ndarray, "faces 3"],
-    size_wh: tuple[int, int],
-) -> Bool[np.ndarray, "height width"]:
-    """Return which pixel centres the projected triangles cover."""
-    width, height = size_wh
-    flat = np.empty((len(pixels), 3), dtype=np.float32)
-    flat[:, 0] = (pixels[:, 0] * 2 - width) / height
-    flat[:, 1] = 1 - pixels[:, 1] * (2 / height)
-    flat[:, 2] = -1
-    depth = np.full((height, width), FAR, dtype=np.float32)
-    eye = np.eye(4, dtype=np.float32)
-    cv2.triangleRasterizeDepth(flat, faces, depth, eye, np.pi / 2, 0.1, FAR, _no_culling())
-    return depth < FAR - 0.1
 
 
 def occluding_contour_at(
@@ -161,10 +140,3 @@ def _span(values: Float[np.ndarray, "folds 2"], size: int) -> tuple[int, int]:
     """Return the first and last pixel, exclusive, around `values` with one to spare each side."""
     low, high = math.floor(values.min()) - 1, math.ceil(values.max()) + 1
     return min(max(low, 0), size), min(max(high, 0), size)
-
-
-@cache
-def _no_culling() -> Any:
-    settings = cv2.TriangleRasterizeSettings()
-    settings.setCullingMode(cv2.RASTERIZE_CULLING_NONE)
-    return settings

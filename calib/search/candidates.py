@@ -14,9 +14,10 @@ from jaxtyping import Float
 
 from toonset.calib.fit.align import INDEPENDENT_POINTS, Fit, align_all
 from toonset.calib.outline.correspondences import Drawing
-from toonset.calib.outline.occluding_contour import Surface, silhouette_mask
+from toonset.calib.outline.occluding_contour import Surface
 from toonset.calib.outline.pose import Pose, project
 from toonset.camera import rotation_distance
+from toonset.dataset.mesh.rasterize import silhouette_mask
 
 SAME_POSE = np.radians(8.0)  # candidates nearer than this are one
 OTHER = np.radians(15.0)  # an alternative this far away is another camera

@@ -14,9 +14,9 @@ import numpy as np
 from jaxtyping import Bool, UInt8
 from PIL import Image, ImageDraw, ImageFont
 
-from toonset.calib.outline.occluding_contour import silhouette_mask
 from toonset.calib.result import Calibration, ViewCalibration
 from toonset.dataset.bundle.calibration_schema import Verdict
+from toonset.dataset.mesh.rasterize import silhouette_mask
 from toonset.dataset.silhouettes.hull_rays import Silhouette, depth_in_hull
 from toonset.mesh import Mesh
 from toonset.view import View

@@ -1,4 +1,4 @@
-"""Rasterise a mesh with OpenCV: depth and face normal at every pixel centre.
+"""Rasterise triangles with OpenCV: depth, normal, cover and number at every pixel centre.
 
 The rasteriser is a pinhole that looks into the middle of the picture. Points are handed to it as
 
@@ -7,22 +7,25 @@ The rasteriser is a pinhole that looks into the middle of the picture. Points ar
                             its nearest point
 
 so that depth is interpolated as the camera does it: as 1 / distance or, so far off, linearly.
-Triangles that reach behind a pinhole are not seen: the rasteriser does not cut them.
+Triangles that reach behind a pinhole are not seen: the rasteriser does not cut them. Triangles that
+are placed in a picture already lie at depth 1.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import cv2
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from toonset.camera import Camera
 
 FAR_OFF = 1000.0  # depth is then linear within 3e-4 of the mesh's, single precision included
 ROOM = 0.02  # of the mesh's depth: clipping planes lie so much nearer and farther
+BEHIND = 9.0  # the far plane of triangles at depth 1
 NEAREST = 1e-3  # of the far plane's distance: the near one's, where the mesh is round the pinhole
 
 Depth = Float[np.ndarray, "height width"]
@@ -54,12 +57,47 @@ def depth_and_normals(
     tint = np.repeat((normal @ camera.rotation.T + 1) / 2, 3, axis=0).astype(np.float32)
     each = np.arange(3 * len(faces), dtype=np.int32).reshape(-1, 3)
     color = np.zeros((*placed.shown.shape, 3), dtype=np.float32)
-    settings = _settings()
-    settings.setShadingType(cv2.RASTERIZE_SHADING_FLAT)
+    settings = _settings(cv2.RASTERIZE_SHADING_FLAT)
     corners = placed.eye[faces.reshape(-1)]
     cv2.triangleRasterize(corners, each, tint, color, placed.shown, *placed.lens, settings)
     depth = placed.past_target()
     return depth, np.where(np.isfinite(depth)[..., None], 2 * color - 1, 0)
+
+
+def silhouette_mask(
+    pixels: Float[np.ndarray, "vertices 2"],
+    faces: Int[np.ndarray, "faces 3"],
+    size_wh: tuple[int, int],
+) -> Bool[np.ndarray, "height width"]:
+    """Return which pixel centres projected triangles cover."""
+    width, height = size_wh
+    shown = np.full((height, width), BEHIND, dtype=np.float32)
+    cv2.triangleRasterizeDepth(_flat(pixels, size_wh), faces, shown, *_ahead(), _settings())
+    return shown < BEHIND - 0.1
+
+
+def face_numbers(
+    corners: Float[np.ndarray, "faces 3 2"], size_wh: tuple[int, int]
+) -> Int[np.ndarray, "height width"]:
+    """Return the number of the triangle that covers a pixel centre, -1 where none does.
+
+    Args:
+        corners: in pixels; triangles do not overlap.
+        size_wh: of the picture.
+    """
+    width, height = size_wh
+    count = len(corners)
+    number = np.repeat((np.arange(count) + 1) / (count + 1), 3).astype(np.float32)
+    shown = np.zeros((height, width, 3), dtype=np.float32)
+    cv2.triangleRasterizeColor(
+        _flat(corners.reshape(-1, 2), size_wh),
+        np.arange(3 * count, dtype=np.int32).reshape(-1, 3),
+        np.repeat(number[:, None], 3, axis=1),
+        shown,
+        *_ahead(),
+        _settings(cv2.RASTERIZE_SHADING_FLAT),
+    )
+    return np.rint(shown[..., 0] * (count + 1)).astype(np.int64) - 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +143,25 @@ class _Placed:
         return np.where(empty, np.inf, self.shown.astype(np.float64) + self.start)
 
 
-def _settings() -> Any:
+def _flat(pixels: Float[np.ndarray, "n 2"], size_wh: tuple[int, int]) -> Float[np.ndarray, "n 3"]:
+    """Return points of a picture as the rasteriser takes them, at depth 1."""
+    width, height = size_wh
+    found = np.full((len(pixels), 3), -1, dtype=np.float32)
+    found[:, 0] = (pixels[:, 0] * 2 - width) / height
+    found[:, 1] = 1 - pixels[:, 1] * (2 / height)
+    return found
+
+
+@cache
+def _ahead() -> tuple[Float[np.ndarray, "4 4"], float, float, float]:
+    """Return the rasteriser's pose, field of view, near and far plane for points at depth 1."""
+    return np.eye(4, dtype=np.float32), np.pi / 2, 0.1, BEHIND
+
+
+@cache
+def _settings(shading: int | None = None) -> Any:
     settings = cv2.TriangleRasterizeSettings()
     settings.setCullingMode(cv2.RASTERIZE_CULLING_NONE)
+    if shading is not None:
+        settings.setShadingType(shading)
     return settings

@@ -12,12 +12,12 @@ import math
 from dataclasses import dataclass
 from importlib.util import find_spec
 
-import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
+from toonset.dataset.mesh.rasterize import face_numbers
 from toonset.errors import SetupError
 from toonset.raster import distance_to, nearest
 
@@ -154,29 +154,7 @@ def texel_faces(
 
     In the gutters it is the nearest face.
     """
-    width, height = atlas.size_wh
-    count = len(atlas.faces)
-    flat = np.full((3 * count, 3), -1, dtype=np.float32)
-    places = atlas.uv[atlas.faces].reshape(-1, 2)
-    flat[:, 0] = (places[:, 0] * 2 - width) / height
-    flat[:, 1] = 1 - places[:, 1] * (2 / height)
-    number = np.repeat((np.arange(count) + 1) / (count + 1), 3).astype(np.float32)
-    shown = np.zeros((height, width, 3), dtype=np.float32)
-    settings = cv2.TriangleRasterizeSettings()
-    settings.setCullingMode(cv2.RASTERIZE_CULLING_NONE)
-    settings.setShadingType(cv2.RASTERIZE_SHADING_FLAT)
-    cv2.triangleRasterizeColor(
-        flat,
-        np.arange(3 * count, dtype=np.int32).reshape(-1, 3),
-        np.repeat(number[:, None], 3, axis=1),
-        shown,
-        np.eye(4, dtype=np.float32),
-        np.pi / 2,
-        0.1,
-        9.0,
-        settings,
-    )
-    face = np.rint(shown[..., 0] * (count + 1)).astype(np.int64) - 1
+    face = face_numbers(atlas.uv[atlas.faces], atlas.size_wh)
     inside = face >= 0
     near = distance_to(inside) <= GUTTER
     return face[nearest(inside)], near, nearest(near)

@@ -5,10 +5,10 @@ import pytest
 
 from lab.bench.cases.bodies import random_body
 from toonset.calib.from_landmarks import calibrate_by_landmarks
-from toonset.calib.outline.occluding_contour import silhouette_mask
 from toonset.calib.result import Calibration
 from toonset.camera import Camera, rotation_distance, rotation_from_angles
 from toonset.dataset.mannequin.landmark_file import Landmarks
+from toonset.dataset.mesh.rasterize import silhouette_mask
 from toonset.errors import LandmarkError
 from toonset.mesh import Mesh
 from toonset.view import View

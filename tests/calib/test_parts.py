@@ -13,16 +13,13 @@ from toonset.calib.evidence.face import FaceEvidence
 from toonset.calib.fit.align import Fit, align
 from toonset.calib.fit.tilt import ElevationPrior, tilt, upright_prior
 from toonset.calib.outline.correspondences import Drawing
-from toonset.calib.outline.occluding_contour import (
-    find_occluding_contour,
-    prepare_surface,
-    silhouette_mask,
-)
+from toonset.calib.outline.occluding_contour import find_occluding_contour, prepare_surface
 from toonset.calib.outline.pose import Pose, project, project_with_jacobian
 from toonset.calib.search.candidates import Candidates
 from toonset.calib.search.sheet_posterior import SheetPosterior, possible_turns
 from toonset.calib.search.templates import build_templates, find_hypotheses
 from toonset.camera import rotation_distance, rotation_from_angles
+from toonset.dataset.mesh.rasterize import silhouette_mask
 from toonset.dataset.silhouettes.contour import drawn_contour
 from toonset.errors import SheetError
 from toonset.mesh import Mesh

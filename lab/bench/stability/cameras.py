@@ -17,10 +17,10 @@ from lab.bench.stability.sheets import DrawnSheet
 from lab.bench.stability.trials import CRASHED, Drawer, Kind, Trial, Tried
 from toonset.calib.calibrate import calibrate
 from toonset.calib.find_cameras import find_cameras
-from toonset.calib.outline.occluding_contour import silhouette_mask
 from toonset.calib.result import Calibration
 from toonset.camera import Camera
 from toonset.dataset.images.picture import encode_png
+from toonset.dataset.mesh.rasterize import silhouette_mask
 from toonset.errors import ToonsetError
 from toonset.mesh import Mesh
 from toonset.options import Body

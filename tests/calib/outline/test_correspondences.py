@@ -11,13 +11,10 @@ from scipy.spatial import KDTree
 from toonset.calib.fit.align import align, align_all, measure
 from toonset.calib.outline.correspondences import Drawing, Table, match, nearest
 from toonset.calib.outline.mesh_edges import Surface, prepare_surface
-from toonset.calib.outline.occluding_contour import (
-    find_occluding_contour,
-    occluding_contour_at,
-    silhouette_mask,
-)
+from toonset.calib.outline.occluding_contour import find_occluding_contour, occluding_contour_at
 from toonset.calib.outline.pose import Pose, project
 from toonset.camera import rotation_distance, rotation_from_angles
+from toonset.dataset.mesh.rasterize import silhouette_mask
 from toonset.dataset.silhouettes.contour import drawn_contour
 from toonset.errors import MeshError
 from toonset.mesh import Mesh

@@ -8,11 +8,12 @@ import pytest
 import trimesh
 
 from toonset.calib.outline.mesh_edges import Surface, prepare_surface
-from toonset.calib.outline.occluding_contour import mask_at, silhouette_mask
+from toonset.calib.outline.occluding_contour import mask_at
 from toonset.calib.outline.pose import Pose, project
 from toonset.calib.search import template_cache, templates
 from toonset.calib.search.template_cache import bank_path, load_bank
 from toonset.calib.search.templates import Templates, build_templates
+from toonset.dataset.mesh.rasterize import silhouette_mask
 from toonset.mesh import Mesh
 
 

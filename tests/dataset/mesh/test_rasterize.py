@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from toonset.camera import Camera
-from toonset.dataset.mesh.rasterize import depth_and_normals, depth_map
+from toonset.dataset.mesh.rasterize import depth_and_normals, depth_map, face_numbers
 
 SIZE = (120, 90)
 
@@ -87,3 +87,19 @@ def test_far_pinholes_keep_their_depth(distance: float) -> None:
     seen = np.isfinite(depth)
     assert seen.sum() == pytest.approx((1.2 * 40) ** 2, rel=0.05)
     np.testing.assert_allclose(depth[seen], -0.2, atol=2e-3)
+
+
+def test_pixels_have_the_number_of_the_triangle_that_their_centre_lies_in() -> None:
+    size, middle = (23, 17), np.array([8.3, 7.1])
+    across, down = np.meshgrid(np.arange(size[0]) + 0.5, np.arange(size[1]) + 0.5)
+    around = np.linspace(0, 2 * np.pi, 10)
+    rim = middle + 6.7 * np.stack([np.cos(around), np.sin(around)], axis=-1)
+    corners = np.stack([np.tile(middle, (9, 1)), rim[:-1], rim[1:]], axis=1)
+    wanted = np.full(across.shape, -1)
+    for number, (a, b, c) in enumerate(corners):
+        sides = [
+            (q[0] - p[0]) * (down - p[1]) - (q[1] - p[1]) * (across - p[0])
+            for p, q in ((a, b), (b, c), (c, a))
+        ]
+        wanted[np.min(sides, axis=0) > 0] = number
+    np.testing.assert_array_equal(face_numbers(corners, size), wanted)

@@ -25,7 +25,7 @@ from lab.bench.stability.fields import TRAINING
 from lab.bench.stability.pages import PAGES
 from lab.bench.stability.scenes import draw_scene
 from lab.bench.stability.sheets import DrawnSheet, draw_sheet
-from toonset.calib.outline.occluding_contour import silhouette_mask
+from toonset.dataset.mesh.rasterize import silhouette_mask
 from toonset.mesh import Mesh
 
 PLAIN: dict[str, Any] = {"outline_px": 0, "cell_px": 120, "views": 3}

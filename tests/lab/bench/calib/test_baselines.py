@@ -16,8 +16,8 @@ from lab.bench.calib.measure import measured_baseline
 from lab.bench.cases.bodies import random_body
 from lab.bench.cases.cases import CalibCase
 from lab.bench.records.record import Recorder
-from toonset.calib.outline.occluding_contour import silhouette_mask
 from toonset.camera import Camera, rotation_distance
+from toonset.dataset.mesh.rasterize import silhouette_mask
 from toonset.view import View
 
 BODY = random_body(4)  # with a bag at one side
