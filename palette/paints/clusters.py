@@ -108,7 +108,7 @@ def _cells(histogram: Histogram, ink: Ink | None) -> tuple[_Cells, Int[np.ndarra
     if ink is not None:
         own = np.concatenate([own, even_oklab_from_rgb(np.array([ink.rgb], dtype=np.uint8))])
         flat = np.append(flat, ink.pixels)
-    return _Cells(own, flat / flat.sum(), ink), _nearest(own, places)[cell_of]
+    return _Cells(own, flat / flat.sum(), ink), nearest_place(own, places)[0][cell_of]
 
 
 def _peaks(cells: _Cells) -> Owners:
@@ -144,7 +144,7 @@ def _only(cells: _Cells, owner: Owners, kept: Bool[np.ndarray, " cells"]) -> Own
     own = kept[owner]
     if not own.any():
         return owner
-    return owner[own][_nearest(cells.places[own], cells.places)]
+    return owner[own][nearest_place(cells.places[own], cells.places)[0]]
 
 
 def _specks(
@@ -163,25 +163,25 @@ def _specks(
         peaks: every cell's peak.
         kept: whether the paint that a cell is given to is one.
     """
-    from scipy.spatial import KDTree
-
     peak_of = peaks[cell_of]
     flat = np.bincount(peak_of, histogram.flat, len(peaks))
     large = (_shares(cells, peaks) >= LEAST_PEAK)[peaks]
     known, small = large & kept, np.flatnonzero(~large & (flat[peaks] >= FEW))
     if not len(small) or not known.any():
         return []
-    away = KDTree(cells.places[known]).query(cells.places[small], distance_upper_bound=UNLIKE)[0]
+    away = nearest_place(cells.places[known], cells.places[small])[1]
     unlike = np.setdiff1d(peaks[small], peaks[small[away < UNLIKE]])
     return [np.flatnonzero(peak_of == peak) for peak in unlike]
 
 
-def _nearest(
-    given: Float[np.ndarray, "m 3"], wanted: Float[np.ndarray, "n 3"]
-) -> Int[np.ndarray, " n"]:
+def nearest_place(
+    known: Float[np.ndarray, "m 3"], wanted: Float[np.ndarray, "n 3"]
+) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+    """Return which of the known colours is nearest to each of others, and how far it is."""
     from scipy.spatial import KDTree
 
-    return np.asarray(KDTree(given).query(wanted)[1])
+    away, number = KDTree(known).query(wanted)
+    return np.asarray(number), np.asarray(away)
 
 
 def _paints(

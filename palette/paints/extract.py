@@ -19,7 +19,7 @@ from toonset.palette.colors import JUST_NOTICEABLE, oklab_from_rgb
 from toonset.palette.names import hex_of
 from toonset.palette.options import MAX_COLORS
 from toonset.palette.paints.areas import paint_areas
-from toonset.palette.paints.clusters import Paint, find_paints
+from toonset.palette.paints.clusters import Paint, find_paints, nearest_place
 from toonset.palette.paints.histogram import Histogram, count_pixels
 from toonset.palette.paints.lost import add_lost_paints
 from toonset.palette.paints.places import patches_of, pixels_of
@@ -124,12 +124,10 @@ def _only_picks(
 
     None where no colour is that of the paint, or where several part its shades among them.
     """
-    from scipy.spatial import KDTree
-
     paint_of = np.empty(len(histogram.colors), dtype=np.int64)
     for number, paint in enumerate(found):
         paint_of[paint.members] = number
-    home = paint_of[KDTree(histogram.colors).query(rgb)[1]]
+    home = paint_of[nearest_place(histogram.colors, rgb)[0]]
     own = oklab_from_rgb(np.array([paint.rgb for paint in found], dtype=np.uint8))[home]
     meant = np.linalg.norm(oklab_from_rgb(rgb) - own, axis=1) <= JUST_NOTICEABLE
     picks = [np.flatnonzero(home == number) for number in range(len(found))]

@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, Int, UInt8
+from jaxtyping import Bool, Float, UInt8
 
 from toonset.palette.colors import JUST_NOTICEABLE, even_oklab_from_rgb
-from toonset.palette.paints.clusters import EXACT, UNLIKE, Paint
+from toonset.palette.paints.clusters import EXACT, UNLIKE, Paint, nearest_place
 from toonset.palette.paints.features import LEAST_PX
 from toonset.palette.paints.histogram import Histogram
 from toonset.palette.paints.line_color import rounded
@@ -73,7 +73,7 @@ def add_lost_paints(
     if not len(middles):
         return list(paints)
     places = even_oklab_from_rgb(histogram.colors)
-    owner, away = _nearest_place(np.concatenate([known, middles]), places)
+    owner, away = nearest_place(np.concatenate([known, middles]), places)
     found = list(paints)
     for number in range(len(known), len(known) + len(middles)):
         members = np.flatnonzero((owner == number) & (away <= GROUP))
@@ -114,7 +114,7 @@ def _unlike(
         like = cv2.inRange(rgb, color - SAME_LEVELS, color + SAME_LEVELS)
         far &= like == 0
     far = wider_than(far, HALF_BLEND_PX)
-    away = _nearest_place(even_oklab_from_rgb(colors), even_oklab_from_rgb(rgb[far]))[1]
+    away = nearest_place(even_oklab_from_rgb(colors), even_oklab_from_rgb(rgb[far]))[1]
     far[far] = away > UNLIKE
     return wider_than(far, HALF_BLEND_PX)
 
@@ -138,7 +138,7 @@ def _middles(seen: Sequence[_Shrunk], known: Places) -> Places:
             borders.append(_lacks_edge(one, wider_than(own, HALF_BLEND_PX)))
         border = np.concatenate(borders)
         passage = border.sum() / max(len(border), 1)
-        away = _nearest_place(known, middle[None])[1][0]
+        away = nearest_place(known, middle[None])[1][0]
         if pixels >= LEAST_PX and passage <= PASSAGE and away >= FAR:
             found.append(middle)
     return np.array(found).reshape(-1, 3)
@@ -154,16 +154,6 @@ def _lacks_edge(one: _Shrunk, area: Mask) -> Bool[np.ndarray, " border"]:
     ring = dilate(own, BEYOND_PX) & ~dilate(own, BEYOND_PX - 1)
     step = np.linalg.norm(lab[ring] - lab[nearest(own)][ring], axis=-1)
     return step[paint[ring]] < STEP
-
-
-def _nearest_place(
-    known: Places, wanted: Places
-) -> tuple[Int[np.ndarray, " n"], Float[np.ndarray, " n"]]:
-    """Return which of some places is nearest to each of others, and how far it is."""
-    from scipy.spatial import KDTree
-
-    away, number = KDTree(known).query(wanted)
-    return np.asarray(number), np.asarray(away)
 
 
 def _largest(mask: Mask) -> Mask:
