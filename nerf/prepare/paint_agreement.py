@@ -264,7 +264,7 @@ def _agreed(
     k = 2 * _HALF
     prior = np.linalg.inv(_BENDS.covariance) / EXPECTED**2
     priors = [prior + figure.held() for figure in figures]
-    precision = block_diag(*priors)
+    precision = np.asarray(block_diag(*priors))
     numbers, gain = begin, 0.0
     for blur in BLURS:
         layers = [_slopes(figure.paint, blur * figure.height_px) for figure in figures]
