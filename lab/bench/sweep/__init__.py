@@ -1,0 +1,1 @@
+"""Sweep of named numbers: what does half or double of each change?"""
