@@ -14,12 +14,11 @@ from jaxtyping import Bool, Float, UInt8
 
 from toonset.dataset.images.jpeg_noise import halo_levels, has_jpeg_grid
 from toonset.dataset.split.background_field import Field, fit_gradient, fit_smooth
-from toonset.dataset.split.background_pattern import Plate, fit_pattern
+from toonset.dataset.split.background_pattern import BINS, Plate, fit_pattern
 from toonset.dataset.split.background_zones import CLOSE, fit_backdrop, fit_steps
 from toonset.errors import SheetError
 from toonset.view import Box, over_white
 
-BINS = 16  # levels per bin of the coarse histogram that finds the dominant colour
 CLUSTER_RADIUS = 32  # levels: border pixels this near to the background are background + noise
 LEAST_TOLERANCE = 2  # levels: a picture without noise still holds rounding
 MOST_TOLERANCE = 48  # levels: beyond it figures would be eaten, whatever the noise

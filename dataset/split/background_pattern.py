@@ -19,7 +19,7 @@ from toonset.view import Box
 
 MARGIN = 0.08  # of the shorter side: the border that holds at least a part of the pattern
 LEAST_MARGIN_PX = 24
-BINS = 16  # levels per bin, and bins per channel, of the border's colours
+BINS = 16  # levels per bin, and bins per channel, of coarse histograms of colours
 COMMON = 0.02  # of the border: a colour of the pattern
 WINDOW_PX = 640  # side of the part whose autocorrelation shows the nearest peaks
 NEAREST_PX = 3

@@ -16,6 +16,7 @@ from jaxtyping import Bool, Float, UInt8
 from toonset.dataset.images.zones import Meetings, Zones, find_meetings, find_zones, shrunk
 from toonset.dataset.split.background_field import Field, fit_zone
 from toonset.dataset.split.background_pattern import Plate
+from toonset.dataset.split.figures.grouping import SWATCH
 from toonset.raster import dilate, from_nearest, parts
 
 LONGEST_PX = 1600  # of the copy in which steps are looked for
@@ -35,7 +36,6 @@ ALL_ALONG = 0.8  # the same of thin zones: frames of panels, no outlines of figu
 WIDE = 0.5  # of the sheet's width: a zone cut off from the border may have a colour of its own
 SHADE = 32  # levels from such colours: other zones that are cut off
 ALL_ROUND = 0.9  # of its outline: a zone with so much backdrop around it lies on it
-SWATCH = 0.9  # of its bounding box: such a zone is a patch of colour
 LEAST_PANEL = 0.1  # of the sheet
 SHOWN = 0.3  # of a panel that is not drawn on: less is a frame
 WITHIN = 0.5  # of what is drawn on a panel: heads and feet stand over its edges

@@ -21,7 +21,7 @@ from toonset.dataset.split.figures.blobs import (
     remove_strangers,
 )
 from toonset.dataset.split.figures.construction_lines import find_construction_lines
-from toonset.dataset.split.figures.frames import find_frames, find_strokes
+from toonset.dataset.split.figures.frames import PAINTED, find_frames, find_strokes
 from toonset.dataset.split.figures.ground_strokes import find_ground_strokes
 from toonset.dataset.split.figures.grouping import HAND, SPECK
 from toonset.dataset.split.figures.open_outlines import LINE, Gap, close_outlines
@@ -44,7 +44,6 @@ MOST_BROAD = 0.5  # of a shadow that is mostly lines
 GREY = 24  # levels between a colour's channels: ink and its soft edges have less
 COLORED = 0.3  # of a figure: it is painted
 SAME_POSE = 0.65  # IoU of its outline with the most like other one
-PAINTED = 0.5  # of a figure that is paint broader than lines: it is no line drawing
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,6 +24,7 @@ from toonset.dataset.split.background import (
 )
 from toonset.dataset.split.background_field import fit_zone
 from toonset.dataset.split.background_zones import LEAST_ZONE
+from toonset.dataset.split.figures.frames import FRAMED
 from toonset.errors import SheetError
 from toonset.raster import connected_to, dilate, erode, from_nearest, sized_parts
 
@@ -44,7 +45,6 @@ AS_TALL = 0.6  # of the tallest drawing on the pages: what stands beside them co
 STRIP = 0.12  # of the same: narrower things beside them are edges and shadows
 STRAIGHT = 0.5  # of each side of a panel: things drawn over its edge hide the rest
 FULL = 0.97  # of a panel: no ground from around it
-FRAMED = 0.3  # of a panel's height: a drawing as high stands on it
 LEAST_PANEL = 0.3  # of the picture
 PLAIN_PANEL = 0.4  # of its inner edge that smooth zones take: no picture
 SMOOTH = 0.95  # of these in the colours of one ground

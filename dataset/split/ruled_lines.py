@@ -14,6 +14,8 @@ import cv2
 import numpy as np
 from jaxtyping import Bool
 
+from toonset.dataset.split.figures.frames import LEAST_SIDE
+
 LEAST_RUN = 0.04  # of the sheet's side along the line
 LEAST_RUN_PX = 24
 LEAST_SHEET = 100  # cells on the shorter side: on a smaller picture a line is part of a drawing
@@ -24,7 +26,6 @@ CROSSING = 0.6  # of the sheet's width: a line this long needs no others
 SHARED = 0.3  # of its width: shorter, if several begin and end with it
 EQUALS = 4  # such lines
 UPRIGHT = 0.9  # of its height: the same; staffs and poles are shorter
-LEAST_SIDE = 0.2  # of the sheet's shorter side: a smaller rectangle is part of a drawing
 ALIKE = 0.8  # overlap of the runs of neighbouring rows
 OPEN = 0.5  # of the line's length with paper on both sides
 OPEN_UPRIGHT = 0.7  # the same of upright lines, which no figure stands behind

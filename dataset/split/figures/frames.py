@@ -17,12 +17,12 @@ from toonset.raster import connected_to, dilate, sized_parts, wider_than
 
 Mask = Bool[np.ndarray, "height width"]
 
-SIDE = 0.2  # of the sheet's shorter side: smaller frames are parts of drawings
+LEAST_SIDE = 0.2  # of the sheet's shorter side: smaller rectangles are parts of drawings
 FULL = 0.85  # of its box that a frame encloses
 FRAMED = 0.3  # of its height: something as high stands in it
 BROAD = 0.1  # of a frame's cells that are broader than a line, as its corners are
 ROUND = 2.6  # times the sum of width and height: a line that goes round its box but once
-PAINTED = 0.5  # of what is drawn that is broader than lines: figures are painted
+PAINTED = 0.5  # of what is drawn that is broader than lines: it is painted, no line drawing
 
 
 def find_frames(blobs: Blobs, painted: Mask) -> Mask:
@@ -75,7 +75,7 @@ def find_strokes(blobs: Blobs, painted: Mask) -> Mask:
 
 
 def _large(blobs: Blobs) -> list[int]:
-    least = SIDE * min(blobs.labels.shape)
+    least = LEAST_SIDE * min(blobs.labels.shape)
     return np.flatnonzero(blobs.boxes[:, 2:].max(axis=1) >= least).tolist()
 
 

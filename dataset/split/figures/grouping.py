@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
-from toonset.dataset.split.figures.blobs import LEVEL, Blobs, reading_order, rows_of
+from toonset.dataset.split.figures.blobs import LEAST_SPECK, LEVEL, Blobs, reading_order, rows_of
 from toonset.dataset.split.figures.printed_palette import (
     Patches,
     are_swatches,
@@ -24,8 +24,7 @@ from toonset.dataset.split.figures.text_and_swatches import find_letters, find_s
 
 WITHIN = 0.5  # of a patch that lies in a figure's box: its part
 NEAR = 0.02  # of the figure's height: a part this near to the figure is the figure's
-ABOVE = 0.08  # of the figure's height: so near something above may be its part
-BESIDE = 0.08  # of the figure's height: so near something beside it may be, in its colours
+BESIDE = 0.08  # of the figure's height: so near its part may be, above it or in its colours
 FARTHEST = 0.3  # of the figure's height: a part that most views have is no farther
 HAT = 0.5  # of the body's height: a part over the head line of the row is no higher
 FEET = 0.95  # of the figure's height from its top: no part's middle lies lower
@@ -37,7 +36,6 @@ TOUCHING = 0.01  # of the figure's height: unless it is as near as this
 PART_AREA = 0.35  # of the figure's area: a larger thing apart is a drawing of its own
 LEAST_PART = 0.004  # of the figure's area: smaller things beside a figure are marks
 SPECK = 0.01  # of the figure's height: the side of a patch that is dust if nothing is near
-LEAST_SPECK = 4  # cells: smaller things are noise
 LISTED_SPECK = 0.0005  # of the figure's area: smaller ones are counted, not listed
 FAMILIAR = 0.8  # of a part's pixels in colours that its figure has
 DARK = 170  # level: ink is no lighter
@@ -45,7 +43,7 @@ LETTER_HEIGHT = 0.1  # of the figure's height
 OFF_INK = 24  # levels from the mixtures of ink and paper: noise
 ONE_INK = 0.95  # of a patch's pixels in its ink
 STROKE = 0.12  # of its box's squared diagonal: a thing that covers no more is a stroke
-SWATCH = 0.9  # of its box that a swatch fills
+SWATCH = 0.9  # of its box that a patch of colour fills
 DISC = (0.74, 0.83)  # of its box that a disc fills
 
 
@@ -202,7 +200,7 @@ def _is_part(blobs: Blobs, number: int, body: int, gap: float, rgb: np.ndarray) 
     if lettering:
         return False
     if above:
-        return bool(gap <= ABOVE * main[3] and own[1] < main[1])
+        return bool(gap <= BESIDE * main[3] and own[1] < main[1])
     return gap <= BESIDE * main[3] and _in_its_colors(blobs, number, body, rgb)
 
 

@@ -47,9 +47,14 @@ class CutCosts:
 
     def prices(self) -> Float[np.ndarray, "3 height width"]:
         """Return a cut's costs per cell: from cleft to cleft along lines, or edges; plainly."""
-        gaps, tolls = GAP * np.maximum(self.solid - self.drawn, 0), self._tolls()
+        tolls = self._tolls()
         costs = self.by_lines() + tolls, self.by_edges() + tolls, self.drawn
-        return np.stack(costs) + gaps
+        return np.stack(costs) + self.gaps()
+
+    def gaps(self) -> Float[np.ndarray, "height width"]:
+        """Return the cost of enclosed paper per cell."""
+        gaps: np.ndarray = GAP * np.maximum(self.solid - self.drawn, 0)
+        return gaps
 
     def by_lines(self) -> Float[np.ndarray, "height width"]:
         """Return the cost of paint per cell if lines are cheap."""

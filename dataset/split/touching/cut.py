@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Int, UInt8
 
 from toonset.dataset.split.figures.blobs import Blobs, as_box
-from toonset.dataset.split.figures.rows import likeness, outline
+from toonset.dataset.split.figures.rows import SAME_OUTLINE, likeness, outline
 from toonset.dataset.split.touching.costs import look_at
 from toonset.dataset.split.touching.profiles import flanks, largest_piece
 from toonset.dataset.split.touching.selection import Option, best_option, find_options
@@ -26,7 +26,6 @@ NARROW = 0.3  # times its own height: what is narrower is one figure
 LEAST_HEIGHT = 24  # cells: in a lower patch no two figures can be told
 THROUGH = 0.7  # of an enclosed patch's height that a cut runs through: a gap between two figures
 MOST_ENCLOSED = 0.25  # of a patch in the background's colour: more is a line drawing
-SAME = 0.75  # IoU of two outlines, mirrored or not: both patches are one figure
 SURE = 0.9  # chance of being right: a cut that has less is worth a look
 
 
@@ -123,7 +122,7 @@ def _cut_by_mistake(
     outlines = [outline(blobs.mask(int(number))) for number in main_blobs]
     single = [outlines[i] for i in np.flatnonzero(~is_cut)]
     alike = [
-        bool(cut and max(likeness([own, other])[0] for other in single) >= SAME)
+        bool(cut and max(likeness([own, other])[0] for other in single) >= SAME_OUTLINE)
         for own, cut in zip(outlines, is_cut, strict=True)
     ]
     return main_blobs[np.array(alike)]

@@ -150,13 +150,12 @@ def best_option(options: Sequence[Option], inside: Bool[np.ndarray, "h w"]) -> t
 def _crossing(cut_costs: CutCosts, seam: Seam) -> tuple[float, float, float]:
     height = len(cut_costs.drawn)
     by_lines, by_edges = cut_costs.by_lines(), cut_costs.by_edges()
-    gap = 0.1 * np.maximum(cut_costs.solid - cut_costs.drawn, 0)
     met = seam.along(cut_costs.drawn) > 0.5
     ends = np.diff(np.concatenate([[0], met.astype(np.int8), [0]]))
     first, last = np.flatnonzero(ends == 1), np.flatnonzero(ends == -1) - 1
     opened = seam.along(cut_costs.open)
     return (
-        float(seam.along(by_lines + gap).sum()) / height,
+        float(seam.along(by_lines + cut_costs.gaps()).sum()) / height,
         float(seam.along(by_edges).sum()) / height,
         float(opened[first].sum() + opened[last].sum()),
     )
