@@ -19,14 +19,14 @@ from jaxtyping import Bool, Int, UInt8
 from toonset.errors import PaletteError
 from toonset.palette.color_names import name_of, with_codes
 from toonset.palette.corrections import PaletteCorrections, Stroke
-from toonset.palette.extract import IN_LIGHT, LINE, PaintMap, in_light, maps_in_light
+from toonset.palette.extract import IN_LIGHT, PaintMap, in_light, maps_in_light
 from toonset.palette.names import RGB, hex_of, rgb_of_hex
 from toonset.palette.palette import MOST_TONES, ContourColor, Palette, PaletteColor, Tone
 from toonset.palette.pixels.antialias import OPAQUE
 from toonset.palette.pixels.cel_tones import step_tones
 from toonset.palette.pixels.labels import UNLABELLED, Space, nearest_colors
 from toonset.palette.pixels.ramp_labels import Ramp, plain_ramp, ramp_of
-from toonset.palette.pixels.shadow import apply_shadow
+from toonset.palette.pixels.shadow import DRAWN, apply_shadow
 from toonset.palette.printed import printed_places
 from toonset.palette.shaded import shaded_labels, with_own_tones
 
@@ -109,12 +109,12 @@ def correct_palette(
     colors = [replace(one, name=names.get(i, told[i])) for i, one in enumerate(colors)]
     ink, is_paint = _ink(found, plan)
     for number, (own, contour) in enumerate(zip(labels, contours, strict=True)):
-        free = (pictures[number][..., 3] >= OPAQUE) & (contour < LINE)
+        free = (pictures[number][..., 3] >= OPAQUE) & (contour < DRAWN)
         for at, stroke in strokes[number] if strokes else ():
             color = plan.number(stroke.color, f"strokes.{at}.color")
             own[_covered(stroke, own.shape) & free] = color
         if not is_paint:
-            own[contour >= LINE] = UNLABELLED
+            own[contour >= DRAWN] = UNLABELLED
     place, last = printed_places([one.rgb for one in colors], found.printed), len(found.printed)
     order = sorted(range(len(colors)), key=lambda i: (place.get(i, last), -colors[i].share))
     anew = np.full(256, UNLABELLED, dtype=np.uint8)

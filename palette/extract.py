@@ -33,7 +33,7 @@ from toonset.palette.pixels.labels import UNLABELLED, Space, label_pixels, neare
 from toonset.palette.pixels.opacity import opaque_inside, see_through_notes
 from toonset.palette.pixels.own_shadows import own_shadow_maps, with_own_shadows
 from toonset.palette.pixels.ramp_labels import ramps_of
-from toonset.palette.pixels.shadow import apply_shadow, find_shadow, find_tones, lit_pictures
+from toonset.palette.pixels.shadow import DRAWN, apply_shadow, find_shadow, find_tones, lit_pictures
 from toonset.palette.pixels.view_gain import gain_notes, view_gains, with_gains
 from toonset.palette.plain_sheets import plain_notes
 from toonset.palette.printed import Printed, in_printed_order, occurring, with_printed
@@ -50,7 +50,6 @@ Picture = UInt8[np.ndarray, "height width 4"]
 Map = UInt8[np.ndarray, "height width"]
 Mask = Bool[np.ndarray, "height width"]
 
-LINE = 128  # of 255: covered by half, a pixel is a drawn line's
 NEVER_IN_LIGHT = 0.95  # of a paint's pixels lie in shadow
 LEAST_STEP = 0.008  # of the character: smaller tones are not told from blends
 SMOOTHED_PX = 2  # from a tone's border: there smoothing has moved it
@@ -201,7 +200,7 @@ def _chosen(
     colors: str | None,
     printed: Printed,
 ) -> Palette:
-    lines = [contour >= LINE for contour in contours]
+    lines = [contour >= DRAWN for contour in contours]
     picked = None if colors is None else _typed("--colors", colors)
     smooth = remove_grain(pictures)
     if is_shaded(pictures):
@@ -490,7 +489,7 @@ def maps_in_light(
     if dark is None:
         return [PaintMap(labels, None) for labels in maps]
     return [
-        PaintMap(labels, _tone_map(labels, shade & (contour < LINE)))
+        PaintMap(labels, _tone_map(labels, shade & (contour < DRAWN)))
         for labels, shade, contour in zip(maps, dark, contours, strict=True)
     ]
 
@@ -500,7 +499,7 @@ def _take_out_lines(maps: Sequence[Map], contours: Sequence[Map], palette: Palet
     ink = palette.contour
     if ink is not None and ink.rgb not in [color.rgb for color in palette.colors]:
         for labels, contour in zip(maps, contours, strict=True):
-            labels[contour >= LINE] = UNLABELLED
+            labels[contour >= DRAWN] = UNLABELLED
 
 
 def _tone_map(labels: Map, dark: Mask) -> Map:

@@ -20,7 +20,8 @@ from toonset.palette.color_names import name_of
 from toonset.palette.colors import JUST_NOTICEABLE, shaded_oklab_from_rgb
 from toonset.palette.names import RGB, hex_of
 from toonset.palette.options import MAX_COLORS
-from toonset.palette.paints.features import ALIKE, LEAST_PX, PLACES, SMALL
+from toonset.palette.paints.features import ALIKE, LEAST_PX, SMALL
+from toonset.palette.paints.places import PLACES
 from toonset.palette.paints.ramps import PRICE, UNIT_PX, Moments, join_patches, joined, moments_of
 from toonset.palette.paints.select import KEEP_REACH, PaletteRule
 from toonset.palette.palette import DroppedColor, Palette, PaletteColor, Tone

@@ -17,7 +17,7 @@ from toonset.palette.palette import Palette
 from toonset.read import parse_json, read_whole, schema_version
 
 NAME, VERSION = "toonset-palette", 1  # toonset.palette.palette says what may change
-MAX_BYTES = 2**20
+MAX_BYTES = 2**20  # of a palette file: thousands of colours fit
 SELDOM = ("sure", "factor")  # of a colour: written where known
 
 _palette = cache(lambda: TypeAdapter(Palette))  # not before it is needed: it takes its time

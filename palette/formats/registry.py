@@ -17,7 +17,7 @@ from toonset.palette.formats.adobe import ase_title, read_aco, read_ase, to_ase
 from toonset.palette.formats.gpl import gpl_title, read_gpl, to_gpl
 from toonset.palette.formats.hex import is_color, read_hex, rgb_of_typed, to_hex
 from toonset.palette.formats.jasc import read_jasc
-from toonset.palette.formats.json import json_title, read_json, to_json
+from toonset.palette.formats.json import MAX_BYTES, json_title, read_json, to_json
 from toonset.palette.formats.text import without_mark
 from toonset.palette.formats.tones import paints_of
 from toonset.palette.names import NamedColor, clean_name
@@ -26,7 +26,6 @@ from toonset.palette.palette import Palette
 from toonset.read import describe, read_whole
 
 UNTITLED = "toonset"
-MAX_BYTES = 2**20  # of a file: thousands of colours fit
 SHOWN = 80  # characters of what was typed, in messages
 
 

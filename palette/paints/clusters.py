@@ -17,12 +17,11 @@ from jaxtyping import Bool, Float, Int, UInt8
 from toonset.palette.colors import JUST_NOTICEABLE, even_oklab_from_rgb
 from toonset.palette.paints.blends import LEAST_FLAT, false_paints
 from toonset.palette.paints.histogram import Histogram, distinct
-from toonset.palette.paints.line_color import Ink, find_ink, rounded
+from toonset.palette.paints.line_color import EXACT, Ink, find_ink, rounded
 from toonset.palette.paints.mdl import evidence_for, merge_peaks
 from toonset.palette.palette import Evidence
 
 CELL = 4  # levels per side of a counting cell
-EXACT = 0.2  # of a paint: so frequent an exact colour is the paint itself
 MOST_CELLS = 4096  # the fullest; the others, of noisy pictures, join the nearest paint
 TOUCHING = 1.5 * JUST_NOTICEABLE  # shades with a wider gap between them are not of one paint
 LEAST_PEAK = 0.002  # of the flat pixels; less is not a paint, but joins the nearest

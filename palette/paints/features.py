@@ -17,6 +17,7 @@ from jaxtyping import Float, UInt8
 from toonset.palette.colors import JUST_NOTICEABLE, oklab_from_rgb
 from toonset.palette.options import MAX_COLORS
 from toonset.palette.paints.clusters import UNLIKE
+from toonset.palette.paints.places import PLACES
 from toonset.palette.palette import Palette, Shadow
 from toonset.palette.pixels.labels import nearest_labels
 from toonset.palette.pixels.shadow import apply_shadow
@@ -25,7 +26,6 @@ RGB = tuple[int, int, int]
 
 WORN_SHARE, WORN_UNLIKE = 0.01, 2 * JUST_NOTICEABLE  # of the character; in OKLab: shoes, belts
 SMALL = 0.05  # of the character: more is no feature, whatever share is asked for
-PLACES = 2  # drawings that show it, or patches in a single one
 THICK = 3  # pixels: a patch of a blend is thinner
 LEAST_PX = 48  # of all patches at that height: two eyes of 5 x 5
 LEFT = 2 * JUST_NOTICEABLE  # from a paint's colour in shadow: such a colour is a rest of it

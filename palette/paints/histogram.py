@@ -15,8 +15,8 @@ import numpy as np
 from jaxtyping import Bool, Int, UInt8, UInt32
 
 from toonset.palette.pixels.antialias import OPAQUE
+from toonset.palette.pixels.opacity import COVERED
 
-COVERED = 128  # of 255: a pixel of the rim counts if the figure covers half of it
 LEAST_NOISE = 2  # levels: a painted gradient's step from one pixel to the next
 MOST_NOISE = 12  # levels: more is an edge, in whatever file
 TYPICAL = 0.4  # of the steps between neighbours: less than half, for edges are steps, too

@@ -10,7 +10,7 @@ from jaxtyping import Float, Int, UInt8
 from toonset.palette.paints.histogram import Histogram
 
 LEAST_SHARE = 0.03  # of the pixels are middles of strokes, or there are no lines worth a colour
-EXACT = 0.2  # of the middles: so frequent an exact colour is the ink itself
+EXACT = 0.2  # of an ink or a paint: so frequent an exact colour is that itself
 CORE = 0.25  # of the middles, the darkest: the others hold some of what lies beside the stroke
 DARKEST = 0.1  # of the middles: if these are black but for the noise, so is the ink
 MOST_FLAT = 0.3  # of the pixels as dark as middles; more of them are a dark paint, not strokes

@@ -14,6 +14,7 @@ from toonset.palette.paints.histogram import OPAQUE_WORD, RGB, Histogram
 from toonset.palette.palette import Palette, Place
 from toonset.palette.pixels.labels import nearest_labels
 
+PLACES = 2  # at which a colour is, or in which drawings: one may be a slip of the pen
 THIN = 2  # pixels: blends along an edge are thinner
 BITS = 8  # of a byte: so many kinds of colours are looked for at once
 

@@ -23,10 +23,9 @@ from toonset.palette.paints.blends import LEAST_FLAT, false_paints
 from toonset.palette.paints.clusters import UNLIKE, Paint
 from toonset.palette.paints.histogram import LEAST_NOISE, Histogram
 from toonset.palette.paints.line_color import rounded
-from toonset.palette.paints.places import THIN, Members, Pixels, patches_of, pixels_of
+from toonset.palette.paints.places import PLACES, THIN, Members, Pixels, patches_of, pixels_of
 from toonset.palette.pixels.labels import nearest_colors
 
-PLACES = 2  # at which a colour is, or it may be a slip
 THICK = 5  # pixels: blends are thinner in a JPEG, too, which smears chroma over two
 VALLEY = 0.25  # of what a colour must cover: so much joins the levels of noise and of gradients
 

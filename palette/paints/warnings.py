@@ -24,10 +24,10 @@ from toonset.palette.names import hex_of
 from toonset.palette.paints.blends import reach_of
 from toonset.palette.paints.clusters import UNLIKE, Paint
 from toonset.palette.paints.histogram import OPAQUE_WORD, Histogram, Picture, rgb_of_words
+from toonset.palette.paints.places import PLACES
 from toonset.palette.palette import Place
 
 WIDEST = 7  # pixels: what is wider has a flat pixel within it, even with a line around
-PLACES = 2  # at which there must be such spots: one may be a slip of the pen
 # That are looked at, or texture would take minutes: parts that are not flat, and pixels unlike what
 # is around
 MOST_PARTS, MOST = 4096, 512

@@ -22,6 +22,7 @@ from jaxtyping import Bool, UInt8
 
 from toonset.palette.pixels.enlarged import find_grid
 from toonset.palette.pixels.grain import remove_grain
+from toonset.palette.pixels.labels import BAND_PX
 from toonset.palette.pixels.opacity import opaque_inside
 
 Morphology = Callable[..., np.ndarray]  # cv2.dilate or cv2.erode
@@ -39,7 +40,6 @@ DARKEST = 100  # lightness of 255: a lighter rim is not ink
 WIDEST = 0.04  # of the figure's height: wider is a limb
 SOFT = 0.004  # of the figure's height: so far inside a blurred rim its line may be dark only
 MEASURED_PX = 800  # height of a figure on which its line's width is measured
-BAND_PX = 1 << 21
 SQUARE = np.ones((3, 3), dtype=np.uint8)
 CROSS = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], dtype=np.uint8)
 

@@ -20,7 +20,7 @@ from toonset.palette.pixels.enlarged import find_grid
 Space = Literal["rgb", "oklab"]
 
 UNLABELLED = 255  # background, soft edges, blends
-BAND_PX = 1 << 21  # pixels looked up at once: bounds the memory
+BAND_PX = 1 << 21  # pixels worked on at once: bounds the memory
 BATCH = 1 << 18  # colours compared with the palette at once
 
 

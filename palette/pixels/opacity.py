@@ -14,7 +14,7 @@ from jaxtyping import Bool, UInt8
 from toonset.palette.pixels.antialias import OPAQUE
 from toonset.raster import erode
 
-COVERED = 128  # of 255: alpha from which a pixel is the figure's
+COVERED = 128  # of 255: a pixel is the figure's if that covers half of it
 RIM = 2  # pixels: a soft rim, as resampling and matting leave it, is no wider
 LEAST = 0.01  # of a drawing: what matting leaves inside is 0.6 % at most, paint 9 % and more
 WORTH_A_LINE = 0.05  # of the figure: less of it see-through is not worth a warning
