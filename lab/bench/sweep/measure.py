@@ -133,7 +133,8 @@ def measure(
             ran = 0
             for n in reached:
                 case, ran = usual.cases[n], ran + 1
-                signal.alarm(int(max(LEAST_S, PATIENCE * usual.seconds[n])))
+                limit_s = max(LEAST_S, PATIENCE * usual.seconds[n])
+                signal.setitimer(signal.ITIMER_PROF, limit_s)  # of processor time
                 try:
                     differs = difference(usual.outcomes[n], case.run())
                 except Exception as error:
@@ -180,7 +181,6 @@ def in_fork(run: Callable[[], Any], limit_s: float) -> Any:
 
 def _answer(run: Callable[[], Any], into: Connection) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-    signal.signal(signal.SIGALRM, signal.SIG_DFL)
     try:
         into.send(run())
     except FixedError as error:

@@ -33,8 +33,8 @@ class FixedError(Exception):
     """A number that cannot be changed once its module is imported."""
 
 
-def changed(value: Any, way: Way) -> Any:
-    """Return half or double of a number, 0 or 1000 times it, or that of each of a collection.
+def changed(value: Any, way: Way | float) -> Any:
+    """Return half or double of a number, 0 or 1000 times it, so many times it; of each of several.
 
     Integers are rounded and change by one at least. What is over a half of its range doubles to
     half way to its end: shares to 1, levels to 255.
@@ -64,7 +64,7 @@ def changed(value: Any, way: Way) -> Any:
     raise FixedError(f"a {type(value).__name__}")
 
 
-def patch(number: Named, uses: Sequence[Use], way: Way) -> Any:
+def patch(number: Named, uses: Sequence[Use], way: Way | float) -> Any:
     """Change a number in this process, for good, and return its new value.
 
     Raises:
@@ -120,7 +120,7 @@ def _bindings(name: str, value: Any) -> list[Any]:
     return [own for own in ours if vars(own).get(name, FixedError) is value]
 
 
-def _each(values: Iterable[Any], way: Way) -> list[Any]:
+def _each(values: Iterable[Any], way: Way | float) -> list[Any]:
     """Return values of which those that hold numbers are changed; there must be some."""
     new, any_changed = [], False
     for value in values:
@@ -134,7 +134,9 @@ def _each(values: Iterable[Any], way: Way) -> list[Any]:
     return new
 
 
-def _whole(value: int, way: Way) -> int:
+def _whole(value: int, way: Way | float) -> int:
+    if isinstance(way, float):
+        return round(way * value)
     if way in EXTREMES:
         return HUGE * value if way == "huge" else 0
     if way == "half":
@@ -145,7 +147,9 @@ def _whole(value: int, way: Way) -> int:
     return 2 * value if value else 1
 
 
-def _real(value: float, way: Way) -> float:
+def _real(value: float, way: Way | float) -> float:
+    if isinstance(way, float):
+        return way * value
     if way in EXTREMES:
         return HUGE * value if way == "huge" else 0.0
     if way == "half":

@@ -25,6 +25,9 @@ TOGETHER = {  # with seeds that draw three or four figures
     ("hand frame",): 9,
     ("ground strokes", "paper"): 13,
 }
+KNOWN = {  # what no other sheet shows, with seeds
+    ("shadows", "tinted", "jpeg"): 7007  # the shadow's tone within a figure
+}
 ALONE = (
     *DIFFICULTIES,
     ("vignette", "frame", "props"),
@@ -51,6 +54,8 @@ def sheets(*, large: bool) -> Iterator[tuple[str, Sheet]]:
     many: list[tuple[tuple[str, ...], MessyOptions]]
     many = [(own, USUAL if n % 2 else SMALL) for n, own in enumerate(alone)]
     many += [((), USUAL if n % 4 == 0 else SMALL) for n in range(MIXTURES)]
+    for difficulties, seed in KNOWN.items() if large else ():
+        yield f"known {', '.join(difficulties)}", make_messy_sheet(seed, difficulties, USUAL).rgba
     for number, (difficulties, options) in enumerate(many if large else ()):
         if not difficulties or {"rows", "outfits"} & {*difficulties}:
             options = MessyOptions(options.figure_px, options.mixed)
