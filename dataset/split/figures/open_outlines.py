@@ -28,7 +28,6 @@ LOOKED_FOR = 0.05  # the same of gaps that are said, not closed
 WALL = 0.03  # of the figure's height, and two cells: no line is thicker
 LEAST_POCKET = 0.002  # of the figure's squared height: smaller pockets are corners of the outline
 LINE = 0.012  # of the figure's height: half of the thickest line
-FIRST_LOOK = 0.6  # of the least length: the largest ball touches fewer of the walls
 JOIN = 0.012  # of the figure's height: across gaps so wide lines are of one figure
 TALL, SOLID = 0.6, 0.04  # of the figure's height, and squared: what is less is no figure
 BESIDE = 2  # cells from a pocket: its walls
@@ -181,10 +180,8 @@ def _close(drawn: Mask, outside: Mask, seeds: Mask, height: float) -> tuple[Mask
     reached = _reached(room, outside, seeds, least.looked_for * height)
     numbers, areas = sized_parts(outside & ~reached, connectivity=4)
     bodies = _bodies(drawn, outside, height)
-    _, facing = _walls(numbers, len(areas), drawn, reached, height)
-    shortest = FIRST_LOOK * least.length * height
     for number in range(1, len(areas)):
-        if areas[number] < least.area * height**2 or facing[number] < shortest:
+        if areas[number] < least.area * height**2:
             continue
         window = _around(numbers == number, round(WALL * height) + 4)
         found = _smallest(

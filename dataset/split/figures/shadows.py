@@ -28,7 +28,6 @@ FEET_OF_HARD = 0.7  # the same of one with a hard edge, which shoes have, too
 EDGE = 0.02  # of the figure's height: a shadow's own edge is no wider
 FADED = 0.93  # of the paper's light, at the shadow's border, besides noise
 MOSTLY = 0.7  # of the border
-GREY = 0.05  # of the figures' upper parts in the shadows' tone: grey clothes, nothing is known
 TONE = 0.03  # of the paper's light: tones so near are one
 BESIDE = 0.12  # of a shadow's border that is paper
 OFTEN = 0.75  # of the views that show a shadow, if one does
@@ -76,22 +75,14 @@ def find_shadows(
 
 
 def _tone(bodies: list[np.ndarray], dims: list[Dim]) -> float | None:
-    """Return the light of the darkest hard shadow; None if the figures' own upper parts have it."""
+    """Return the light of the darkest hard shadow; None if there is none."""
     deep = np.concatenate(
         [
             np.concatenate([[], *(dim.light[piece] for piece in _pieces(body, dim, body))])
             for body, dim in zip(bodies, dims, strict=True)
         ]
     )
-    if not len(deep):
-        return None
-    toned = area = 0
-    for body, dim in zip(bodies, dims, strict=True):
-        upper = body[: int(TOP * len(body))]
-        light, smooth = dim.light[: len(upper)], dim.smooth[: len(upper)]
-        toned += int((upper & smooth & (np.abs(light - np.median(deep)) <= TONE)).sum())
-        area += int(upper.sum())
-    return None if toned > GREY * area else float(np.percentile(deep, 10))
+    return float(np.percentile(deep, 10)) if len(deep) else None
 
 
 def _is_soft(body: np.ndarray, dim: Dim, piece: np.ndarray) -> bool:
