@@ -28,6 +28,7 @@ TOGETHER = {  # with seeds that draw three or four figures
 KNOWN = {  # what no other sheet shows, with seeds
     ("shadows", "tinted", "jpeg"): 7007  # the shadow's tone within a figure
 }
+SEVERAL = MessyOptions((80, 260), most_figures=4)
 ALONE = (
     *DIFFICULTIES,
     ("vignette", "frame", "props"),
@@ -55,7 +56,7 @@ def sheets(*, large: bool) -> Iterator[tuple[str, Sheet]]:
     many = [(own, USUAL if n % 2 else SMALL) for n, own in enumerate(alone)]
     many += [((), USUAL if n % 4 == 0 else SMALL) for n in range(MIXTURES)]
     for difficulties, seed in KNOWN.items() if large else ():
-        yield f"known {', '.join(difficulties)}", make_messy_sheet(seed, difficulties, USUAL).rgba
+        yield f"known {', '.join(difficulties)}", make_messy_sheet(seed, difficulties, SEVERAL).rgba
     for number, (difficulties, options) in enumerate(many if large else ()):
         if not difficulties or {"rows", "outfits"} & {*difficulties}:
             options = MessyOptions(options.figure_px, options.mixed)
