@@ -23,7 +23,6 @@ CLUSTER_RADIUS = 32  # levels: border pixels this near to the background are bac
 LEAST_TOLERANCE = 2  # levels: a picture without noise still holds rounding
 MOST_TOLERANCE = 48  # levels: beyond it figures would be eaten, whatever the noise
 FAR = 0.1  # of the shorter side from everything drawn: soft edges and glows end nearer
-LEAST_FAR_PX = 8
 COMMON_ALPHA = 0.001  # of what is far: an alpha that is the ground's
 MOST_RESIDUAL = 32  # alpha: more is paint
 TRANSPARENT = 0.01  # of the sheet: less see-through area is an accident, not a background
@@ -139,7 +138,7 @@ def remove_residual_alpha(
     """
     alpha = rgba[..., 3]
     drawn = (alpha >= 128).view(np.uint8)
-    reach = 2 * round(max(LEAST_FAR_PX, FAR * min(drawn.shape))) + 1
+    reach = 2 * round(max(8, FAR * min(drawn.shape))) + 1
     far = cv2.dilate(drawn, np.ones((reach, reach), np.uint8)) == 0
     often = np.bincount(alpha[far], minlength=256) > COMMON_ALPHA * np.count_nonzero(far)
     level = int(np.flatnonzero(often[: MOST_RESIDUAL + 1]).max(initial=0))

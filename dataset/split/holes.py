@@ -33,7 +33,6 @@ from toonset.raster import depth_inside, dilate, distance_to, erode, sized_parts
 from toonset.view import over_white
 
 LEAST_HOLE_PX = 9
-LEAST_ISLAND_PX = 4
 LEAST_ISLAND = 0.008  # of the figure's height, its side: smaller is the paper's grain
 LINE_ART = 0.5  # of the figure without its lines: more in the background's colour is a line drawing
 EDGE_PX = 2.0  # of a figure on transparency: its soft edge
@@ -319,4 +318,4 @@ def _has_islands(patch: Bool[np.ndarray, "height width"], least_px: float) -> bo
     outside = np.pad(~patch, 1, constant_values=True).astype(np.uint8)
     _, _, stats, _ = cv2.connectedComponentsWithStats(outside, connectivity=8)
     sizes = np.sort(stats[1:, cv2.CC_STAT_AREA])[::-1]  # the largest is the surroundings
-    return bool((sizes[1:] >= max(LEAST_ISLAND_PX, least_px**2)).any())
+    return bool((sizes[1:] >= max(4, least_px**2)).any())

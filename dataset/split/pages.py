@@ -48,7 +48,6 @@ FULL = 0.97  # of a panel: no ground from around it
 LEAST_PANEL = 0.3  # of the picture
 PLAIN_PANEL = 0.4  # of its inner edge that smooth zones take: no picture
 SMOOTH = 0.95  # of these in the colours of one ground
-UPRIGHT_DEG = 0.5
 UPRIGHT = 0.97  # of the smallest rectangle: less is a perspective
 FOCAL = 0.75  # of a photograph's longer side: a phone's lens
 
@@ -245,8 +244,8 @@ def _page(own: Bool[np.ndarray, "rows columns"]) -> _Page | None:
     tallest = int(heights.max(initial=0))
     if (heights >= THING * tall).sum() < 2 and tallest < ALONE * tall:
         return None
-    tilt = abs((angle + 45) % 90 - 45)
-    return _Page(mask > 0, corners, own, tallest, tilt <= UPRIGHT_DEG and filled >= UPRIGHT)
+    tilt_deg = abs((angle + 45) % 90 - 45)
+    return _Page(mask > 0, corners, own, tallest, tilt_deg <= 0.5 and filled >= UPRIGHT)
 
 
 def _panel(

@@ -109,8 +109,9 @@ def close_outlines(walls: Mask, paper: Mask, ring: Mask) -> tuple[Mask, tuple[Ga
         return np.zeros_like(walls), ()
     rows, columns = (np.arange(size) // step for size in walls.shape)
     filled = pockets[rows[:, None], columns] & paper
+    cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
     for _ in range(step if step > 1 else 0):  # up to the lines, which coarse cells contain
-        filled = cv2.dilate(filled.view(np.uint8), _CROSS).view(np.bool_) & paper
+        filled = cv2.dilate(filled.view(np.uint8), cross).view(np.bool_) & paper
     scaled = [
         Gap(
             *(step * gap.x + step // 2, step * gap.y + step // 2, step * gap.width),
@@ -146,9 +147,6 @@ def _walls(
     behind = walled & (_distance(outside) <= WALL * height + 2)
     length, facing = (np.bincount(numbers[mask], minlength=count) for mask in (walled, behind))
     return length, facing
-
-
-_CROSS = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
 
 
 def _figure_height(solid: Mask) -> float:

@@ -29,7 +29,6 @@ MOST_COUNTED = 4  # figures of a group: more speak no more for a turnaround
 ALONE = 0.5  # likeness of a figure alone, to set beside that of figures in a row
 SAME_OUTLINE = 0.75  # IoU of two drawings of one figure from one direction
 CLEARLY_SAME = 0.06  # IoU, mean of a row: so much more alike as they are than mirrored
-MOST_OUTFITS = 26  # a letter each
 ROWS = 64  # at which outlines are compared
 MOST_COMPARED = 64  # figures of one group or row
 
@@ -207,7 +206,7 @@ def _are_outfits(blobs: Blobs, rows: tuple[np.ndarray, ...]) -> bool:
     A second row of a turnaround goes on turning: its outlines are mirror images of the first's.
     """
     columns = {len(row) for row in rows}
-    if not 2 <= len(rows) <= MOST_OUTFITS or len(columns) > 1:
+    if not 2 <= len(rows) <= 26 or len(columns) > 1:  # a letter each
         return False
     if not 2 <= max(columns) <= MOST_COMPARED:
         return False

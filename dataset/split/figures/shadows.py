@@ -19,7 +19,6 @@ from toonset.raster import dilate, parts_mostly_in
 OFF_MEAN = 0.2  # of the noise: so far a whole patch may be off
 LEAST_AREA = 0.01  # of the figure's area, with its edge
 LEAST_CORE = 0.003  # of the figure's area: the smooth inside of a shadow
-LEAST_CELLS = 8
 TOP = 0.4  # of the figure's height from its top: no shadow reaches higher
 WHOLE = 0.9  # of the figure without the shadow that is still one piece
 ENCLOSED = 0.5  # of the shadow that the figure surrounds: more is a patch of its clothes
@@ -100,7 +99,7 @@ def _pieces(
         (dim.smooth & room).view(np.uint8), connectivity=8
     )
     labels = np.asarray(found, dtype=np.int32)
-    large = stats[:, cv2.CC_STAT_AREA] >= max(LEAST_CELLS, LEAST_CORE * body.sum())
+    large = stats[:, cv2.CC_STAT_AREA] >= max(8, LEAST_CORE * body.sum())
     able = np.flatnonzero(large & (stats[:, cv2.CC_STAT_TOP] >= TOP * body.shape[0]))
     pieces = [labels == number for number in able[able > 0]]
     return [piece for piece in pieces if _is_open_shade(piece, dim, body, room)]
