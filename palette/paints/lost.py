@@ -16,10 +16,10 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from toonset.palette.colors import JUST_NOTICEABLE, even_oklab_from_rgb
-from toonset.palette.paints.clusters import EXACT, UNLIKE, Paint, nearest_place
+from toonset.palette.paints.clusters import UNLIKE, Paint, nearest_place
 from toonset.palette.paints.features import LEAST_PX
 from toonset.palette.paints.histogram import Histogram
-from toonset.palette.paints.line_color import rounded
+from toonset.palette.paints.line_color import EXACT, rounded
 from toonset.palette.pixels.antialias import OPAQUE
 from toonset.palette.pixels.patches import shrunk, without_grain
 from toonset.raster import dilate, erode, nearest, sized_parts, wider_than
