@@ -135,6 +135,7 @@ def measure(
                 case, ran = usual.cases[n], ran + 1
                 limit_s = max(LEAST_S, PATIENCE * usual.seconds[n])
                 signal.setitimer(signal.ITIMER_PROF, limit_s)  # of processor time
+                differs: Difference
                 try:
                     differs = difference(usual.outcomes[n], case.run())
                 except Exception as error:
@@ -152,7 +153,8 @@ def measure(
             fixed = found.removeprefix("FixedError: ")
             moved: dict[str, Difference] = {}
             if fixed == found:  # it ended without a word
-                moved, fixed = {"a case": {"lost": found}}, ""
+                ended: Difference = {"lost": found}
+                moved, fixed = {"a case": ended}, ""
             new, ran = "", len(reached)
         else:
             (new, ran, moved), fixed = found, ", ".join(lines)
