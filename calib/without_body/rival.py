@@ -46,7 +46,7 @@ def with_body_or_without(
     """Return the calibration that explains the drawings better, and whether it has no body.
 
     A body that explains nothing loses to drawings that cohere, the default one also to drawings
-    with a better verdict; else paint, faces, detail, outlines and layout decide. A mannequin that
+    with milder verdicts; else paint, faces, detail, outlines and layout decide. A mannequin that
     somebody gave loses where the drawings alone are right with the probability `thresholds.sure`;
     one that stays though every view is certain without it says so. Nothing is tried where the
     mannequin's cameras are certain, or, where somebody put it on a view, not failed; nor where

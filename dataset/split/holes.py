@@ -17,6 +17,9 @@ between arm and body) if all of this holds:
   but beside light paint of another tint (cream trousers on cream paper) it is enough that the patch
   has the paper's tint,
 - most of the figure is in other colours (else it is a line drawing, whose paper is its body).
+
+On even tinted paper a patch in exactly the paper's colour is a hole whatever is round it, unless
+something lies inside it: nobody mixes that paint by chance.
 """
 
 from __future__ import annotations
@@ -53,6 +56,9 @@ AS_INKED = 0.65  # of the outline's share of ink
 SLACK = 0.05  # of the border: the shares of a short border are rough
 PAPER_TINT = 3.0  # levels, of a patch's mean: nearer to the background is paper beside light paint
 PAINT_TINT = 6.0  # levels: farther is light paint
+TINTED = 250  # levels, of the background's darkest band: paper below is tinted
+EVEN_PAPER = 2  # levels, over a figure's crop: paper with parts of its own may be in their paint
+EXACT = 0.3  # levels, of a patch's mean: nearer to tinted paper it is that paper
 LEAST_PAINT = 0.5  # of a patch's area: so much light paint tells what paper is
 
 
@@ -127,6 +133,8 @@ def open_holes(
     area = int(mask.sum())
     if not enclosed.any() or is_line_art(mask, enclosed):
         return mask, 0
+    bare, opened = _bare_paper(rgb, mask, enclosed, background, least_share * area)
+    enclosed, result = enclosed & ~bare, mask & ~bare
     if filled is not None:
         enclosed = enclosed & ~filled
     contrast, luma = (
@@ -139,7 +147,6 @@ def open_holes(
     )
     tints = _tints(labels, len(stats), rgb, background)
     light_paint = int(stats[1:, cv2.CC_STAT_AREA][tints[1:] > PAINT_TINT].sum())
-    result, opened = mask.copy(), 0
     rows = np.flatnonzero(mask.any(axis=1))
     top, height = int(rows[0]), int(rows[-1] - rows[0]) + 1
     for number in range(1, len(stats)):
@@ -256,6 +263,34 @@ def _is_behind_a_limb(
     walls = depth[rim]
     thin = float((walls <= max(LEAST_WALL_PX, THIN_WALL * tall)).mean())
     return thin <= MOST_THIN and float(walls.min()) <= THICK_WALL * tall
+
+
+def _bare_paper(
+    rgb: UInt8[np.ndarray, "height width 3"],
+    mask: Bool[np.ndarray, "height width"],
+    enclosed: Bool[np.ndarray, "height width"],
+    background: UInt8[np.ndarray, "height width 3"],
+    least_px: float,
+) -> tuple[Bool[np.ndarray, "height width"], int]:
+    """Return the patches that show tinted paper, and how many; see `open_holes`."""
+    found, count = np.zeros_like(mask), 0
+    low, high = background.min(axis=(0, 1)), background.max(axis=(0, 1))
+    tinted = low.min() < TINTED and high.max() > INK_LUMA  # black and white are common paints
+    if not (enclosed.any() and tinted and (high - low).max() <= EVEN_PAPER):
+        return found, count
+    least_island = LEAST_ISLAND * np.count_nonzero(mask.any(axis=1))
+    labels, areas = sized_parts(enclosed, connectivity=4)
+    # pixels of edges and of lines across a gap are another colour
+    own = np.where(erode(enclosed) & (difference(rgb, background) < CLEAR), labels, 0)
+    tints = _tints(own, len(areas), rgb, background)
+    large = (areas >= max(least_px, LEAST_HOLE_PX)) & (
+        np.bincount(own.ravel(), minlength=len(areas)) > 0
+    )
+    for number in np.flatnonzero(large & (tints <= EXACT)):
+        if number and not _has_islands(labels == number, least_island):
+            found |= labels == number
+            count += 1
+    return found, count
 
 
 def _fading(

@@ -270,8 +270,9 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
         color, labels = mixed(looks, np.zeros_like(chosen), counts)
     color, labels = _extended(kept, color, labels, pen)
     if sight is None:
-        meeting = joints(looks, np.where(kept, chosen, -1))
-        color, labels = settled(color, labels, meeting, alpha > 0, pen, figure_px)
+        inside = alpha > 0
+        meeting = joints(looks, np.where(kept, chosen, -1), inside)
+        color, labels = settled(color, labels, meeting, inside, pen, figure_px)
     stepped = sight is None and drawings.steps_hold
     if line is not None and (stepped or len(drawings.lined_pairs)):
         unlined = _unlined(looks, np.where(kept, chosen, -1), alpha > SOLID, figure_px)

@@ -2,7 +2,8 @@
 
 A seam, a step of the surface and paint that goes on beyond what a drawing shows leave borders that
 are ragged by a few pixels. Beside such joints every pixel takes the paint that most of its
-neighbourhood has, thin lines counting more, and borders are softened by one pixel.
+neighbourhood has, and borders are softened by one pixel; thin lines count as much more as they must
+to keep their width.
 
 The drawings tell of every pair of paints whether the artist draws a line along all of its borders.
 Where a view has such a border without a line, because a seam runs there, one is drawn. Pairs with a
@@ -16,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from math import erf, sqrt
 
 import cv2
 import numpy as np
@@ -38,7 +40,9 @@ SOFT_PX = 1.0  # sigma that smooths them
 SETTLED = 0.004  # of the height: sigma of the neighbourhood that settles a ragged border
 LEAST_PX = 0.7  # of the same
 RAGGED = 2.0  # times this sigma: so far beside a joint borders are settled
-PEN, FINER = 1.7, 0.6  # lines count so many times, in a neighbourhood so much smaller
+FINER = 0.6  # times this sigma: the neighbourhood in which lines count
+MOST = 4.0  # times paint: so much a thin line counts at most
+FAR = 1e-3  # share of a neighbourhood: a paint with less is not in it
 PAINTS = 256  # a pair is its lower paint times so many, and the higher one
 NONE = 0xFFFF  # no pair
 
@@ -192,6 +196,7 @@ def settled(
     best, second = (np.full(band.shape, -1, np.float32) for _ in range(2))
     first, other, kind = color.copy(), color.copy(), labels.copy()
     lines = lines_of(color, pen, beside=False) & inside
+    ink = np.bincount(labels[lines], minlength=1).argmax()  # the label that lines have
     room = int(np.ceil(3 * sigma))
     for number, here, box in _kinds(labels, lines, inside, band, room):
         at, own, here = band[box], color[box], here[box]
@@ -199,8 +204,11 @@ def settled(
         near = cv2.GaussianBlur(shares, (0, 0), sigma)
         mean = broad_blur(own * shares[..., None], sigma) / np.maximum(near, 1e-4)[..., None]
         shown = cv2.copyTo(own, here.view(np.uint8), mean)
-        if number is None:
-            near = PEN * cv2.GaussianBlur(shares, (0, 0), FINER * sigma)
+        if number is None and pen:  # an edge of a line beside paint stays where it is
+            fine = FINER * sigma
+            weight = min(MOST, 1 / erf(pen[0] / (fine * sqrt(2))))
+            near = weight * cv2.GaussianBlur(shares, (0, 0), fine)
+        near = np.where(near < FAR, -1, near)
         leads, follows = at & (near > best[box]), at & (near > second[box])
         for condition, values, kept in (
             (follows, shown, other[box]),
@@ -210,7 +218,7 @@ def settled(
             cv2.copyTo(values, condition.view(np.uint8), kept)
         second[box] = np.where(leads, best[box], np.maximum(near, second[box]))
         best[box] = np.maximum(near, best[box])
-        kind[box][leads] = labels[box][leads] if number is None else number
+        kind[box][leads] = ink if number is None else number
     away = (best - np.maximum(second, 0)) * sigma * np.float32(np.sqrt(np.pi / 2))  # pixels
     part = np.clip(0.5 + away[band], 0, 1)[:, None]
     found = color.copy()

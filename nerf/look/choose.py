@@ -311,12 +311,13 @@ def _cut(
     own[inner] = np.where(behind[node[inner]], pair[1], pair[0])
 
 
-def joints(looks: Sequence[Look], chosen: Int[np.ndarray, "h w"]) -> Mask:
+def joints(looks: Sequence[Look], chosen: Int[np.ndarray, "h w"], inside: Mask) -> Mask:
     """Return the pixels beside which a view shows another drawing, or another place of the same.
 
     Args:
         looks: the drawings.
         chosen: of them, -1 where none is shown.
+        inside: pixels of the figure; its outline is no joint.
     """
     x, y = (np.zeros(chosen.shape, np.float32) for _ in range(2))
     for number, look in enumerate(looks):
@@ -330,6 +331,7 @@ def joints(looks: Sequence[Look], chosen: Int[np.ndarray, "h w"]) -> Mask:
     ):
         off = cv2.max(cv2.absdiff(x[here], x[there]), cv2.absdiff(y[here], y[there]))
         apart = (chosen[here] != chosen[there]) | (off > JUMP_PX)
+        apart &= inside[here] & inside[there]
         found[here] |= apart
         found[there] |= apart
     return found

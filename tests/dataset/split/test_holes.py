@@ -85,3 +85,33 @@ def test_a_white_label_that_lies_is_paint_and_a_gap_beside_an_arm_is_none(
     cv2.rectangle(picture, (100, 180), (100 + wide, 180 + high), PAPER, -1)
     cv2.rectangle(picture, (100, 180), (100 + wide, 180 + high), INK, 3)
     assert alpha_at(picture, 100 + wide // 2, 180 + high // 2) == alpha
+
+
+def on_paper(paper: tuple[int, int, int], patch: tuple[int, int, int]) -> np.ndarray:
+    """Return a body with a thin arm round a patch on its right, and an eye with a pupil."""
+    picture = np.full((TALL, WIDE, 3), paper, np.uint8)
+    cv2.rectangle(picture, (90, 30), (180, 390), NAVY, -1)
+    cv2.rectangle(picture, (176, 150), (240, 300), INK, 6)  # the arm, as thin as a line
+    cv2.rectangle(picture, (183, 156), (234, 294), patch, -1)
+    cv2.circle(picture, (135, 180), 16, patch, -1)
+    cv2.circle(picture, (135, 180), 6, INK, -1)
+    return picture
+
+
+@pytest.mark.parametrize(
+    ("paper", "off", "opens"),
+    [((216, 216, 216), 0, True), ((216, 216, 216), 2, False), ((255, 255, 255), 0, False)],
+)
+def test_a_patch_of_exactly_the_tinted_papers_colour_is_a_hole_whatever_is_round_it(
+    paper: tuple[int, int, int], off: int, opens: bool
+) -> None:
+    picture = on_paper(paper, (paper[0] - off,) * 3)
+    assert alpha_at(picture, 210, 220) == (0 if opens else 255)
+    assert alpha_at(picture, 135, 170) == 255  # the white of the eye
+
+
+def test_a_ruled_line_across_a_gap_on_tinted_paper_goes_with_it() -> None:
+    picture = on_paper((216, 216, 216), (216, 216, 216))
+    for columns in (slice(0, 90), slice(183, 235), slice(244, WIDE)):
+        picture[230:233, columns] = 130
+    assert alpha_at(picture, 210, 231) == alpha_at(picture, 210, 220) == 0

@@ -131,19 +131,35 @@ def test_a_ragged_border_is_smooth_and_soft_by_a_pixel(rng: np.random.Generator)
     np.testing.assert_array_equal(names[far], labels[far])
 
 
-def test_lines_and_texture_at_a_joint_stay(rng: np.random.Generator) -> None:
-    size = 300
+@pytest.mark.parametrize("figure_px", [300.0, 1000.0])
+@pytest.mark.parametrize("width", [2, 4, 8])
+def test_a_line_keeps_its_width_its_label_and_its_paints_texture_at_a_joint(
+    width: int, figure_px: float
+) -> None:
+    size = 200
     labels = np.zeros((size, size), np.uint8)
-    color = np.broadcast_to(PAINTS[0] / np.float32(255), (size, size, 3)).copy()
-    color += rng.normal(0, 0.02, (size, size, 1)).astype(np.float32)
-    color[:, 149:151] = np.array(INK) / 255
+    labels[:, 100:] = 1
+    labels[:, 100 - width // 2 : 100 + width // 2] = 3
+    color = np.concatenate([PAINTS, [INK]])[labels] / np.float32(255)
+    grain = np.random.default_rng(0).normal(0, 0.01, (size, size, 1)).astype(np.float32)
+    color = np.where(labels[..., None] < 3, color + grain, color)
     joints = np.zeros((size, size), bool)
-    joints[150] = True
-    pen = (2.0, INK)
-    shown, _ = settled(color, labels, joints, np.ones_like(joints), pen, 300.0)
-    dark = (shown < 0.2).all(axis=-1)
-    assert dark[:, 149:151].all()
-    np.testing.assert_array_equal(shown[:, :140], color[:, :140])
+    joints[100] = True
+    pen = (float(width), INK)
+    shown, names = settled(color, labels, joints, np.ones_like(joints), pen, figure_px)
+    dark = (1 - shown.max(axis=-1) / color[0, 0].max()).clip(0.2, 1) - 0.2
+    assert dark[100].sum() == pytest.approx(dark[20].sum(), abs=0.35)
+    assert abs(int((names[100] == 3).sum()) - width) <= 1
+    np.testing.assert_array_equal(shown[100, :80], color[100, :80])  # grain stays
+
+
+def test_no_black_gets_into_tips_far_from_any_other_paint() -> None:
+    color, labels = np.full((120, 120, 3), 0.9, np.float32), np.zeros((120, 120), np.uint8)
+    inside = np.zeros((120, 120), bool)
+    inside[40:80, 40:80] = inside[20:40, 60] = True  # a spike
+    labels[40:80, 40:44], color[40:80, 40:44] = 1, (0.6, 0.3, 0.3)
+    shown, _ = settled(color, labels, inside, inside, None, 1000.0)
+    assert shown[20:30, 60].min() > 0.85
 
 
 def test_without_joints_or_a_figure_nothing_is_settled(rng: np.random.Generator) -> None:

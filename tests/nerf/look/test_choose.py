@@ -94,10 +94,15 @@ def test_joints_are_where_neighbours_show_other_drawings_or_other_places() -> No
     paint = np.full((*INSIDE.shape, 3), 0.6, np.float32)
     looks = [look_at(paint, 0.5), look_at(paint, 0.5)]
     chosen = np.where(X < 60, 0, 1)
-    assert np.flatnonzero(joints(looks, chosen).any(axis=0)).tolist() == [59, 60]
-    assert not joints(looks, np.zeros_like(chosen)).any()
+    assert np.flatnonzero(joints(looks, chosen, INSIDE).any(axis=0)).tolist() == [59, 60]
+    assert not joints(looks, np.zeros_like(chosen), INSIDE).any()
     folded = X + np.float32(2 * JUMP_PX) * (Y > 30)
     step = Look(looks[0].texture, folded, Y, INSIDE, 1.0, 1.0)
-    assert np.flatnonzero(joints([step], np.zeros_like(chosen)).any(axis=1)).tolist() == [30, 31]
+    assert np.flatnonzero(joints([step], np.zeros_like(chosen), INSIDE).any(axis=1)).tolist() == [
+        30,
+        31,
+    ]
     finer = Look(looks[0].texture, folded, Y, INSIDE, 1.0, 0.4)  # of a pixel of the view
-    assert not joints([finer], np.zeros_like(chosen)).any()
+    assert not joints([finer], np.zeros_like(chosen), INSIDE).any()
+    disc = (X - 60) ** 2 + (Y - 60) ** 2 < 900
+    assert not joints(looks, np.where(disc, 0, -1), disc).any()  # an outline is no joint
