@@ -22,8 +22,8 @@ from jaxtyping import Bool, Float, UInt8
 from toonset.nerf.layered_views.light import Light, light_of
 from toonset.nerf.layered_views.lossy import rgb_of_webp, webp
 from toonset.nerf.layered_views.unmix import PARTS, Unmixed, unmixed, unmixed_shaded
-from toonset.nerf.look.blend import SOLID, DrawnView
 from toonset.nerf.look.drawings import INK_LIKE
+from toonset.nerf.look.drawn_view import SOLID, DrawnView
 from toonset.nerf.look.outline import Outline
 from toonset.palette.palette import Shadow
 from toonset.raster import depth_inside, distance_to, from_nearest

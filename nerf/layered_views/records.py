@@ -12,7 +12,7 @@ from toonset.nerf.layered_views.layered import LEVELS, Layered
 from toonset.nerf.layered_views.light import BRIGHTEST, DARKEST, LIGHTEST, MIDDLE, TINT
 from toonset.nerf.layered_views.lossy import webp
 from toonset.nerf.layered_views.unmix import PARTS
-from toonset.nerf.look.blend import DRAWN, GUESSED, MIRRORED, SOLID, DrawnView
+from toonset.nerf.look.drawn_view import DRAWN, GUESSED, MIRRORED, SOLID, DrawnView
 
 SMALL = {"quality": 60, "alpha_quality": 50}  # of further layers: 60 % of the bytes for 2 dB
 

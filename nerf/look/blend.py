@@ -11,143 +11,37 @@ Source: Debevec, Taylor and Malik 1996 (view-dependent texture mapping); Eiseman
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.camera import Camera
-from toonset.nerf.hull.mannequin_shape import FINER, Shape, ShapeView
+from toonset.nerf.hull.mannequin_shape import FINER, Shape
+from toonset.nerf.look.asked import flanking, looks_of, own_part
 from toonset.nerf.look.borders import Unlined, missing_lines, missing_steps, settled
-from toonset.nerf.look.choose import OTHER, Look, choose, filled_from, joints, mixed, shared_groups
+from toonset.nerf.look.choose import Look, choose, filled_from, joints, mixed, shared_groups
 from toonset.nerf.look.drawings import (
-    CRUMB,
     STEP,
     Drawings,
     Texture,
     crisp_depth,
-    look_up,
     places_in,
     sample_picture,
 )
+from toonset.nerf.look.drawn_view import DRAWN, GUESSED, MIRRORED, SOLID, DrawnView, Geometry
 from toonset.nerf.look.features import lines_of
-from toonset.nerf.look.outline import crisp_outline, inked_outline, without_noise
-from toonset.nerf.look.paint_flow import NEIGHBOURS
 from toonset.nerf.look.shade import smoothed
-from toonset.nerf.look.silhouette import between_outlines, smooth_outline
 from toonset.nerf.look.stamps import NEARER, Stamp, stamped, stamps, torn
-from toonset.nerf.look.step_lines import draw_steps
 from toonset.nerf.look.surface import smooth_surface
-from toonset.palette.pixels.labels import UNLABELLED
-from toonset.raster import dilate, sized_parts
+from toonset.nerf.look.view_lines import ROOM, border_of, inner_lines, outlined, with_lines
+from toonset.raster import dilate
 
-SOLID = 0.5  # opacity from which a pixel shows the surface
-BORDER = 0.7  # opacity at an outline between bent drawings, whose hull is a little too large
-SIDE = 1.4  # radians: a drawing farther off the view shows too little of it
-THIRDS = 2  # further drawings that are asked
-ROOM = 0.03  # of the figure's height, round what is drawn
 EDGE_PX = 4  # round a drawing: enlarging by cubic curves reaches two pixels
-SAME = 1e-9  # radians: seen from one side
-# Radians off a drawing's own camera, in which the view becomes the drawing; where the others were
-# made to agree and it was bent or moved for that, the less, the steadier
-OWN, OWN_BENT = 0.12, 0.04
 # Of the height, and pixels, beside the nearest drawing: what lies farther from it is not shown
 BEYOND, BESIDE_PX = 0.01, 2
-AFLOAT = 0.25  # share of what floats beside a figure: so much of it has to in a drawing, too
-LEGS = 0.1  # of the figure: what is larger stays, though nothing joins it
-DRAWN, MIRRORED, GUESSED = 0, 1, 2  # where a pixel's paint comes from
-SOURCES = ("drawn", "mirrored", "guessed")
 Box = tuple[slice, slice]  # rows and columns
-
-
-@dataclass(frozen=True, eq=False)
-class Geometry:
-    """Geometry of the field as a view sees it.
-
-    Attributes:
-        camera: of the view.
-        alpha: (height, width) opacity in [0, 1].
-        depth: (height, width) past the camera's target, nan where nothing is seen.
-    """
-
-    camera: Camera
-    alpha: Float[np.ndarray, "height width"]
-    depth: Float[np.ndarray, "height width"]
-
-    @classmethod
-    def of(cls, camera: Camera) -> Geometry:
-        """Return what is seen where only the mannequin's shape is known: nothing."""
-        size = camera.size_wh[::-1]
-        return cls(camera, np.zeros(size, np.float32), np.full(size, np.nan, np.float32))
-
-    def crop(self, rows: slice, columns: slice) -> Geometry:
-        """Return a part of the view."""
-        at = (rows, columns)
-        size = (columns.stop - columns.start, rows.stop - rows.start)
-        corner = (columns.start, rows.start)
-        return Geometry(self.camera.moved(corner, size), self.alpha[at], self.depth[at])
-
-
-@dataclass(frozen=True, eq=False)
-class DrawnView:
-    """A view in the drawn look.
-
-    Attributes:
-        rgb: (height, width, 3) premultiplied colour in [0, 1], lines included.
-        alpha: (height, width) coverage in [0, 1].
-        ink: (height, width) share of every pixel that lines cover.
-        labels: (height, width) of `Drawings.paints`.
-        paint: (height, width, 3) straight colour under the lines, in [0, 1].
-        source: (height, width) of a pixel's paint: DRAWN; MIRRORED, where only the mirror image of
-            a drawing shows the place; GUESSED, which is the paint beside it; or, in a
-            view of which no drawing shows anything, that of the nearest drawing behind it.
-    """
-
-    rgb: Float[np.ndarray, "height width 3"]
-    alpha: Float[np.ndarray, "height width"]
-    ink: Float[np.ndarray, "height width"]
-    labels: UInt8[np.ndarray, "height width"]
-    paint: Float[np.ndarray, "height width 3"]
-    source: UInt8[np.ndarray, "height width"]
-
-    @property
-    def by_field(self) -> float:
-        """Return the share of the figure's pixels that no drawing shows."""
-        return self.share(GUESSED)
-
-    def share(self, source: int) -> float:
-        """Return the share of the figure's pixels whose paint comes from a source."""
-        solid = self.alpha >= SOLID
-        return float((solid & (self.source == source)).sum() / max(solid.sum(), 1))
-
-    def palette_labels(self, colors: int) -> UInt8[np.ndarray, "height width"]:
-        """Return the labels of a palette's colours; 255 beside the figure and on other ink."""
-        shown = (self.alpha >= SOLID) & (self.labels < colors)
-        return np.where(shown, self.labels, UNLABELLED).astype(np.uint8)
-
-
-def flanking(cameras: list[Camera], camera: Camera) -> tuple[int, int, float]:
-    """Return the two drawings beside a view, and the first one's share.
-
-    The first is the nearest, the second the nearest of those towards which the view lies from it;
-    shares are linear in the angle along the arc between them. Where the view lies towards none,
-    both are the same.
-    """
-    forward = camera.rotation[2]
-    theirs = np.stack([own.rotation[2] for own in cameras])
-    angles = np.arccos(np.clip(theirs @ forward, -1, 1))
-    first = int(angles.argmin())
-    start = theirs[first]
-    turns = theirs - (theirs @ start)[:, None] * start
-    whole = np.arctan2(np.linalg.norm(turns, axis=1), theirs @ start)
-    turns /= np.maximum(np.linalg.norm(turns, axis=1, keepdims=True), 1e-12)
-    along = np.arctan2(turns @ forward, start @ forward)
-    towards = (along > SAME) & (whole > SAME) & (whole < NEIGHBOURS)
-    if not towards.any():
-        return first, first, 1.0
-    second = int(np.where(towards, angles, np.inf).argmin())
-    return first, second, 1 - min(1.0, float(along[second] / whole[second]))
 
 
 def blend_view(drawings: Drawings, view: Geometry) -> DrawnView:
@@ -161,10 +55,10 @@ def blend_view(drawings: Drawings, view: Geometry) -> DrawnView:
         np.zeros((height, width, 3), np.float32),
         np.zeros((height, width), np.uint8),
     )
-    fitting, border = drawings.fitting(view.camera.scale), _border(drawings, view)
+    fitting, border = drawings.fitting(view.camera.scale), border_of(drawings, view)
     shape, room = drawings.shape, int(np.ceil(ROOM * drawings.height * view.camera.scale)) + 1
     box = _box(view.alpha > 0, room) if shape is None else shape.box(view.camera)
-    own, share = _own_part(fitting, view.camera)
+    own, share = own_part(fitting, view.camera)
     limbs = _limbs(fitting, view.camera)
     if limbs is not None:
         box = _joined(box, limbs.box(view.camera))
@@ -182,15 +76,6 @@ def _limbs(drawings: Drawings, camera: Camera) -> Shape | None:
     """Return what the drawing nearest to a view shows and the field lacks."""
     first, _, _ = flanking([one.camera for one in drawings.views], camera)
     return drawings.views[first].limbs
-
-
-def _own_part(drawings: Drawings, camera: Camera) -> tuple[int, np.float32]:
-    """Return the drawing nearest to a view, and how far the view is that drawing itself, 0 to 1."""
-    forward = np.stack([view.camera.rotation[2] for view in drawings.views])
-    turns = np.arccos(np.clip(forward @ camera.rotation[2], -1, 1))
-    nearest_one = int(turns.argmin())
-    reach = OWN if drawings.views[nearest_one].original is None else OWN_BENT
-    return nearest_one, np.float32(_eased(max(0.0, 1 - float(turns[nearest_one]) / reach)))
 
 
 def _own_box(drawings: Drawings, number: int, camera: Camera) -> Box | None:
@@ -242,15 +127,15 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
         view, limb = _posed(drawings, flank[0], view)
         depth = smooth_surface(view.depth, drawings.height, figure_px)
     points = camera.unproject_grid(depth)
-    numbers, looks = _looks(drawings, camera, points, flank)
+    numbers, looks = looks_of(drawings, camera, points, flank)
     if limb.any():  # which no other drawing shows
         looks = [looks[0], *(replace(one, seen=one.seen & ~limb) for one in looks[1:])]
-    own, part = _own_part(drawings, camera)
+    own, part = own_part(drawings, camera)
     whole = np.zeros((*depth.shape, 4), np.float32)
     if part > 0:
         whole = _as_drawn(drawings.textures[own], points)
     scale = looks[0].scale
-    alpha, ink = _outlined(drawings, view, looks, border, sight, whole[..., 3], part)
+    alpha, ink = outlined(drawings, view, looks, border, sight, whole[..., 3], part)
     both = flank[0] != flank[1]
     shared = shared_groups(looks) if both and sight is None else []
     chosen, counts = choose(looks, alpha > 0, figure_px, shared)
@@ -289,8 +174,8 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
     if sight is not None and drawings.shade is not None:
         color = color * drawings.shade.tone(smoothed(sight.normal, figure_px), FINER)
     if sight is not None:
-        ink = np.maximum(ink, np.minimum(_inner_lines(drawings, sight, scale), alpha))
-    rgb, alpha = _with_lines(drawings, color, alpha, ink, whole, part)
+        ink = np.maximum(ink, np.minimum(inner_lines(drawings, sight, scale), alpha))
+    rgb, alpha = with_lines(drawings, color, alpha, ink, whole, part)
     if part == 1:
         source = np.full(source.shape, MIRRORED if drawings.views[own].mirrored else DRAWN)
     return DrawnView(rgb, alpha, ink, labels, color, source.astype(np.uint8))
@@ -348,142 +233,8 @@ def _posed(
     return replace(view, alpha=alpha, depth=depth), added
 
 
-def _looks(
-    drawings: Drawings,
-    camera: Camera,
-    points: Float[np.ndarray, "h w 3"],
-    flank: tuple[int, int, float],
-) -> tuple[list[int], list[Look]]:
-    """Return the drawings that a view asks, the nearest first, and how they see its places."""
-    first, second, share = flank
-    figure_px = drawings.height * camera.scale
-    found = drawings.flow(first, second) if first != second else None
-    flow = None if found is None else np.float32(found[1]) * found[0].at(points)
-    sides = [(first, -(1 - share), share)]
-    if second != first:
-        sides.append((second, share, 1 - share))
-    forward = camera.rotation[2]
-    for number in _others(drawings, camera, (first, second)):
-        facing = float(drawings.textures[number].camera.rotation[2] @ forward)
-        sides.append((number, 0.0, OTHER * facing))
-    looks = []
-    for number, part, weight in sides:
-        texture = drawings.textures[number]
-        slack, least_px = STEP * drawings.height, CRUMB * figure_px**2
-        seen = look_up(texture, points, slack, least_px, faces=drawings.shape is None)
-        x, y = seen.moved(flow, part)
-        scale = camera.scale / texture.camera.scale
-        looks.append(Look(texture, x, y, seen.mask, weight, scale))
-    return [number for number, _, _ in sides], looks
-
-
-def _others(drawings: Drawings, camera: Camera, used: tuple[int, int]) -> list[int]:
-    forward = np.stack([view.camera.rotation[2] for view in drawings.views])
-    angles = np.arccos(np.clip(forward @ camera.rotation[2], -1, 1))
-    order = [int(i) for i in np.argsort(angles) if i not in used and angles[i] < SIDE]
-    return order[:THIRDS]
-
-
-def _outlined(
-    drawings: Drawings,
-    view: Geometry,
-    looks: list[Look],
-    border: float,
-    sight: ShapeView | None,
-    whole: Float[np.ndarray, "h w"],
-    part: np.float32,
-) -> tuple[Float[np.ndarray, "h w"], Float[np.ndarray, "h w"]]:
-    """Return coverage and ink of a view's outline.
-
-    Args:
-        drawings: whose line it is.
-        view: what is seen of the field.
-        looks: the drawings, those that flank the view first.
-        border: opacity at the outline.
-        sight: what the view shows of the mannequin's shape, if the field is one.
-        whole: coverage of the nearest drawing as it is on the sheet, moved to the view.
-        part: of it in the result.
-    """
-    figure_px = drawings.height * view.camera.scale
-    line_px = drawings.pen.width_px * looks[0].scale if drawings.pen else 0.0
-    if sight is not None:
-        soft = view.alpha + part * (whole - view.alpha)
-        return crisp_outline(soft, border + float(part) * (SOLID - border), line_px, figure_px)
-    cover = without_noise(view.alpha, border, figure_px)
-    rims = []
-    for look in looks[:2] if len(looks) > 1 and looks[0].share < 1 else looks[:1]:
-        facing = float(look.texture.camera.rotation[2] @ view.camera.rotation[2])
-        angle = float(np.arccos(np.clip(facing, -1, 1)))
-        rims.append((look.texture.rim.at(look.x, look.y), look.share, angle))
-    inside = between_outlines(smooth_outline(cover, figure_px), rims, figure_px)
-    inside = np.where(_afloat(inside > 0, looks), -ROOM, inside).astype(np.float32)
-    return inked_outline(inside * figure_px, line_px, figure_px)
-
-
-def _afloat(solid: Bool[np.ndarray, "h w"], looks: list[Look]) -> Bool[np.ndarray, "h w"]:
-    """Return the parts of a figure that float beside it, though no drawing shows them so."""
-    part, areas = sized_parts(solid)
-    if len(areas) < 3:
-        return np.zeros(solid.shape, dtype=bool)
-    kept = np.zeros(len(areas))
-    for look in looks:
-        afloat = sample_picture(
-            look.texture.afloat.view(np.uint8), (look.x, look.y), cv2.INTER_NEAREST
-        )
-        share = np.bincount(part.ravel(), ((afloat > 0) & look.seen).ravel(), len(areas)) / areas
-        kept = np.maximum(kept, share)
-    kept[areas > LEGS * areas[1:].sum()] = 1
-    kept[0] = kept[1 + int(areas[1:].argmax())] = 1
-    off = (kept < AFLOAT)[part]
-    return dilate(off, 2) & (off | ~solid)
-
-
 def _as_drawn(texture: Texture, points: Float[np.ndarray, "h w 3"]) -> Float[np.ndarray, "h w 4"]:
     """Return a drawing as it is on the sheet where surface points lie in it, premultiplied."""
     places, _, _ = places_in(texture.drawn_by, points)
     x, y = (np.round(at, 3) for at in places)  # at the drawing's own camera its very pixels
     return np.asarray(cv2.remap(texture.drawn, x, y, cv2.INTER_CUBIC).clip(0, 1))
-
-
-def _with_lines(
-    drawings: Drawings,
-    paint: Float[np.ndarray, "h w 3"],
-    alpha: Float[np.ndarray, "h w"],
-    ink: Float[np.ndarray, "h w"],
-    whole: Float[np.ndarray, "h w 4"],
-    part: np.float32,
-) -> tuple[Float[np.ndarray, "h w 3"], Float[np.ndarray, "h w"]]:
-    """Return colour, premultiplied, and coverage of paint with its lines; `whole`: see above."""
-    pen = drawings.pen
-    drawn_with = np.array(pen.rgb if pen else (0, 0, 0), np.float32) / np.float32(255)
-    rgb = paint * cv2.merge([alpha - ink] * 3)  # faster than one channel for three
-    if pen:
-        rgb += cv2.merge([ink * level for level in drawn_with])
-    if part > 0 and pen == drawings.outline:  # the drawing's own line, too
-        drawn = np.minimum(whole[..., :3], whole[..., 3:])
-        mix = part * whole[..., 3:] * alpha[..., None]
-        rgb = rgb * (1 - part * whole[..., 3:]) + mix * drawn / np.maximum(whole[..., 3:], 1e-6)
-        last = max(np.float32(0), 2 * part - 1)  # what the surface lacks is there as a whole or not
-        rgb, alpha = rgb + last * (drawn - rgb), alpha + last * (whole[..., 3] - alpha)
-    return rgb, alpha
-
-
-def _inner_lines(drawings: Drawings, sight: ShapeView, scale: float) -> Float[np.ndarray, "h w"]:
-    """Return how far lines cover every pixel where one part of the figure hides another."""
-    pen, outline, style = drawings.pen, drawings.outline, drawings.steps
-    if pen is None or outline is None or style is None:
-        return np.zeros(sight.alpha.shape, np.float32)
-    wider = pen.width_px / max(outline.width_px, 1e-6)
-    return draw_steps(sight.fine, style, drawings.height, FINER, scale * wider)
-
-
-def _border(drawings: Drawings, view: Geometry) -> float:
-    """Return the opacity at an outline; in small views opacity is soft by their own pixels."""
-    if not drawings.bent or drawings.shape is not None:
-        return SOLID
-    finer = view.camera.scale / min(one.camera.scale for one in drawings.views)
-    return SOLID + min(1.0, finer) * (BORDER - SOLID)
-
-
-def _eased(part: float) -> float:
-    return part * part * (3 - 2 * part)

@@ -14,7 +14,8 @@ from toonset.camera import Camera
 from toonset.dataset.images.picture import encode_grey_png, encode_indexed_png, encode_png
 from toonset.errors import BundleError, OutputError, PaletteError, ToonsetError
 from toonset.nerf.fields.trained_field import NO_DRAWINGS, NO_LINES, NO_PALETTE, TrainedField
-from toonset.nerf.look.blend import SOLID, DrawnView, Geometry, blend_view
+from toonset.nerf.look.blend import blend_view
+from toonset.nerf.look.drawn_view import SOLID, DrawnView, Geometry
 from toonset.nerf.options import LAYERS
 from toonset.nerf.render.depth import DepthLevels, normal_picture
 from toonset.palette.pixels.labels import UNLABELLED

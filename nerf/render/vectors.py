@@ -25,7 +25,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 from skimage.measure import find_contours, label
 
-from toonset.nerf.look.blend import SOLID, DrawnView
+from toonset.nerf.look.drawn_view import SOLID, DrawnView
 from toonset.nerf.look.outline import Outline
 from toonset.nerf.render.bezier import Curve, Points, fit_closed
 from toonset.raster import (

@@ -20,7 +20,7 @@ from toonset.camera import Camera
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.fields.triplane import TriplaneField
 from toonset.nerf.kernels.threads import one_thread
-from toonset.nerf.look.blend import Geometry
+from toonset.nerf.look.drawn_view import Geometry
 from toonset.nerf.render.baked import Baked
 from toonset.nerf.render.cast import ViewRays, cast
 from toonset.nerf.render.labels import NONE, labels_of, palette_shares

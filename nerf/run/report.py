@@ -18,7 +18,7 @@ from toonset.dataset.bundle.scene import Scene
 from toonset.dataset.images.picture import encode_png
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.kernels.threads import side_by_side, threads_in_use
-from toonset.nerf.look.blend import SOURCES
+from toonset.nerf.look.drawn_view import SOURCES
 from toonset.nerf.render.baked import Baked
 from toonset.nerf.render.layers import Rendering, color_picture, default_layer
 from toonset.nerf.render.turntable import between_drawings

@@ -19,8 +19,10 @@ from jaxtyping import UInt8
 
 from toonset.camera import Camera
 from toonset.nerf.kernels.threads import side_by_side
-from toonset.nerf.look.blend import GUESSED, MIRRORED, SOLID, blend_view, flanking
+from toonset.nerf.look.asked import flanking
+from toonset.nerf.look.blend import blend_view
 from toonset.nerf.look.drawings import Drawings
+from toonset.nerf.look.drawn_view import GUESSED, MIRRORED, SOLID
 from toonset.nerf.render.baked import Baked
 from toonset.nerf.render.layers import Rendering
 from toonset.nerf.render.turntable import between_drawings

@@ -28,8 +28,10 @@ from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.dataset.silhouettes.mask import has_figure
 from toonset.nerf.kernels.threads import side_by_side
-from toonset.nerf.look.blend import SOLID, Geometry, blend_view, flanking
+from toonset.nerf.look.asked import flanking
+from toonset.nerf.look.blend import blend_view
 from toonset.nerf.look.drawings import Drawings
+from toonset.nerf.look.drawn_view import SOLID, Geometry
 from toonset.nerf.render.baked import Baked
 from toonset.nerf.render.views import render
 from toonset.palette.color_names import name_of

@@ -21,7 +21,7 @@ from toonset.camera import Camera
 from toonset.cli.common.host import keep_freed_memory
 from toonset.dataset.bundle.scene import Scene
 from toonset.nerf.fields.trained_field import TrainedField
-from toonset.nerf.look.blend import flanking
+from toonset.nerf.look.asked import flanking
 from toonset.nerf.look.drawings import Drawings
 from toonset.nerf.options import TrainOptions
 from toonset.nerf.render.baked import Baked

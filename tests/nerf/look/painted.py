@@ -12,9 +12,9 @@ from tests.nerf.ellipsoids import first_hit
 from toonset.camera import Camera
 from toonset.dataset.bundle.scene import Frame, Scene
 from toonset.nerf.hull.hull import Hull
-from toonset.nerf.look.blend import Geometry
 from toonset.nerf.look.build import drawings_of
 from toonset.nerf.look.drawings import Drawings
+from toonset.nerf.look.drawn_view import Geometry
 
 SIDE, FINE, LINE_PX = 120, 4, 2.0
 AXES = np.array([0.6, 0.9, 0.5])

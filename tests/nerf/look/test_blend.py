@@ -24,9 +24,10 @@ from tests.nerf.look.painted import (
     unseen,
     with_an_arm,
 )
-from toonset.nerf.look.blend import DRAWN, GUESSED, MIRRORED, _extended, blend_view, flanking
+from toonset.nerf.look.blend import _extended, blend_view
 from toonset.nerf.look.build import drawings_of
 from toonset.nerf.look.drawings import Drawings, Original
+from toonset.nerf.look.drawn_view import DRAWN, GUESSED, MIRRORED
 from toonset.nerf.look.outline import Outline
 from toonset.nerf.render.layers import color_picture
 from toonset.nerf.score.metrics import compare
@@ -178,18 +179,6 @@ def test_recolouring_changes_one_paint_and_leaves_the_others(egg: Drawings) -> N
     np.testing.assert_array_equal(after.rgb[far], before.rgb[far])
     same = blend_view(replace(egg, repaint=PALETTE), shown)
     assert same.rgb.tobytes() == before.rgb.tobytes()
-
-
-def test_flanking_shares_are_linear_along_the_arc_and_whatever_the_elevation() -> None:
-    cameras = ring()
-    step = 2 * np.pi / 8
-    for elevation in (0.0, 0.4):
-        first, second, share = flanking(cameras, camera_at(0.25 * step, elevation))
-        assert (first, second) == (0, 1)
-        assert share == pytest.approx(0.75, abs=0.02)
-    assert flanking(cameras, cameras[3])[0] == 3
-    assert flanking(cameras, cameras[3])[2] == pytest.approx(1)
-    assert flanking(cameras[:1], camera_at(1.0)) == (0, 0, 1.0)
 
 
 @pytest.mark.parametrize("color", [(0, 0, 0), (200, 40, 40)])

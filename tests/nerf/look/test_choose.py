@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from toonset.nerf.look.blend import _afloat
 from toonset.nerf.look.choose import JUMP_PX, Look, choose, joints, shared_groups
+from toonset.nerf.look.view_lines import _afloat
 
 SIZE = 120
 Y, X = (axis.astype(np.float32) for axis in np.mgrid[:SIZE, :SIZE])

@@ -10,9 +10,10 @@ import pytest
 
 from tests.nerf.bodies import ARM, PALETTE, Hand, body, camera_at, depths, drawing, own_shape, sheet
 from toonset.camera import Camera
-from toonset.nerf.look.blend import Geometry, blend_view
+from toonset.nerf.look.blend import blend_view
 from toonset.nerf.look.build import drawings_of
 from toonset.nerf.look.drawings import Drawings
+from toonset.nerf.look.drawn_view import Geometry
 from toonset.nerf.look.outline import Outline
 from toonset.nerf.render.layers import color_picture
 from toonset.nerf.score.metrics import compare

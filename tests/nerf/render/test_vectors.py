@@ -11,8 +11,8 @@ import pytest
 
 from tests.nerf.render.test_open_raster import rendering
 from toonset.errors import UsageError
-from toonset.nerf.look.blend import DrawnView
 from toonset.nerf.look.drawings import Drawings
+from toonset.nerf.look.drawn_view import DrawnView
 from toonset.nerf.look.outline import Outline
 from toonset.nerf.render.bezier import fit_closed, flattened
 from toonset.nerf.render.svg import check_traced, encode_svg, svg_of

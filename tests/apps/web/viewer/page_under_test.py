@@ -24,7 +24,7 @@ from toonset.nerf.layered_views.records import (
     origins_record,
     picture_record,
 )
-from toonset.nerf.look.blend import DRAWN, GUESSED, MIRRORED, DrawnView
+from toonset.nerf.look.drawn_view import DRAWN, GUESSED, MIRRORED, DrawnView
 from toonset.nerf.look.outline import Outline
 
 SIZE_WH = (60, 90)

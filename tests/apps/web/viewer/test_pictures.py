@@ -22,7 +22,7 @@ from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.layered_views.build import SheetDrawings, cameras_of, views_of_field
 from toonset.nerf.layered_views.ring import Ring, ring_through
 from toonset.nerf.layered_views.sights import SHRINK
-from toonset.nerf.look.blend import SOLID
+from toonset.nerf.look.drawn_view import SOLID
 from toonset.nerf.render.recolor import recolor_run
 from toonset.nerf.render.turntable import drawn_on_sheet
 from toonset.nerf.render.views import render

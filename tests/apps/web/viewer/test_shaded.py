@@ -19,7 +19,7 @@ from PIL import Image
 from lab.bench.view.hues import left_hues
 from toonset.nerf.layered_views.layered import layered
 from toonset.nerf.layered_views.records import coding, layered_record
-from toonset.nerf.look.blend import DRAWN, DrawnView
+from toonset.nerf.look.drawn_view import DRAWN, DrawnView
 from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.pixels.ramp_recolor import recolor_shaded
 from toonset.raster import erode
