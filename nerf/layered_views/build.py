@@ -41,7 +41,7 @@ from toonset.nerf.layered_views.sights import (
     layers_of,
     paints_and_pen,
 )
-from toonset.nerf.look.drawings import Original
+from toonset.nerf.look.drawing import Original
 from toonset.nerf.render.turntable import FILL, drawn_on_sheet, filled_box, framed
 from toonset.nerf.render.views import render
 from toonset.nerf.run.folder import CONFIG, read_field

@@ -11,8 +11,9 @@ from jaxtyping import Float
 
 from toonset.camera import Camera
 from toonset.nerf.look.choose import OTHER, Look
-from toonset.nerf.look.drawings import CRUMB, STEP, Drawings, look_up
+from toonset.nerf.look.drawings import STEP, Drawings
 from toonset.nerf.look.paint_flow import NEIGHBOURS
+from toonset.nerf.look.texture import CRUMB, look_up
 
 SIDE = 1.4  # radians: a drawing farther off the view shows too little of it
 THIRDS = 2  # further drawings that are asked

@@ -22,19 +22,15 @@ from toonset.nerf.hull.mannequin_shape import FINER, Shape
 from toonset.nerf.look.asked import flanking, looks_of, own_part
 from toonset.nerf.look.borders import Unlined, missing_lines, missing_steps, settled
 from toonset.nerf.look.choose import Look, choose, filled_from, joints, mixed, shared_groups
-from toonset.nerf.look.drawings import (
-    STEP,
-    Drawings,
-    Texture,
-    crisp_depth,
-    places_in,
-    sample_picture,
-)
+from toonset.nerf.look.crisp_depth import crisp_depth
+from toonset.nerf.look.drawings import STEP, Drawings
 from toonset.nerf.look.drawn_view import DRAWN, GUESSED, MIRRORED, SOLID, DrawnView, Geometry
 from toonset.nerf.look.features import lines_of
+from toonset.nerf.look.places import places_in, sample_picture
 from toonset.nerf.look.shade import smoothed
 from toonset.nerf.look.stamps import NEARER, Stamp, stamped, stamps, torn
 from toonset.nerf.look.surface import smooth_surface
+from toonset.nerf.look.texture import Texture
 from toonset.nerf.look.view_lines import ROOM, border_of, inner_lines, outlined, with_lines
 from toonset.raster import dilate
 

@@ -16,7 +16,8 @@ from toonset.dataset.silhouettes.mask import has_figure, mask_of
 from toonset.nerf.hull.hull import Hull
 from toonset.nerf.hull.mannequin_shape import Shape, shape_of
 from toonset.nerf.kernels.threads import side_by_side
-from toonset.nerf.look.drawings import STEP, Drawing, Drawings, Original, levels_of
+from toonset.nerf.look.drawing import Drawing, Original, levels_of
+from toonset.nerf.look.drawings import STEP, Drawings
 from toonset.nerf.look.flat_paint import flat_paint
 from toonset.nerf.look.outline import outline_of
 from toonset.nerf.look.paint_flow import Depths, pair_flows

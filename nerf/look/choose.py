@@ -19,8 +19,9 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
-from toonset.nerf.look.drawings import Texture, sample_picture
 from toonset.nerf.look.outline import without_crumbs
+from toonset.nerf.look.places import sample_picture
+from toonset.nerf.look.texture import Texture
 from toonset.raster import broad_blur, dilate, in_rows, nearest, taken
 
 EDGE = 0.02  # of the figure's height, as all lengths: so near to a drawing's edges it counts less

@@ -1,4 +1,4 @@
-"""Project a sheet's drawings as textures into another view, with visibility."""
+"""The drawings of a sheet and the surface that they show, ready to be looked up."""
 
 from __future__ import annotations
 
@@ -7,78 +7,33 @@ from functools import cached_property
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, Float16, Shaped, UInt8, UInt16
+from jaxtyping import Float, Float16, UInt8, UInt16
 
 from toonset.camera import Camera
 from toonset.dataset.silhouettes.mask import mask_of
 from toonset.nerf.hull.mannequin_shape import Shape
-from toonset.nerf.look.borders import Unlined, lined_pairs
-from toonset.nerf.look.features import Features, features_of
-from toonset.nerf.look.outline import Outline, without_crumbs
+from toonset.nerf.look.borders import lined_pairs
+from toonset.nerf.look.crisp_depth import SQUARE, filled
+from toonset.nerf.look.drawing import Drawing, depth_of, halved
+from toonset.nerf.look.outline import Outline
 from toonset.nerf.look.paint_labels import paint_labels, repainted
+from toonset.nerf.look.places import places_in, sample_picture
 from toonset.nerf.look.shade import Shade
 from toonset.nerf.look.silhouette import Rim, rim_of
 from toonset.nerf.look.step_lines import StepLines, step_edges
+from toonset.nerf.look.texture import Texture
 from toonset.nerf.sections.roles import hull_is_square
 from toonset.palette.palette import Shadow
 from toonset.palette.pixels.labels import nearest_colors
 from toonset.palette.pixels.ramp_labels import Ramp, plain_ramp
-from toonset.raster import depth_inside, distance_to, nearest, sized_parts, taken
+from toonset.raster import depth_inside, distance_to
 
 STEP = 0.03  # of the figure's height: surfaces so far apart in depth are two
-FACES = 2  # times as far behind: hair bulges over faces, which stay whole
 BESIDE_PX = 2  # behind a step of a known shape: hands miss steps by as much
 FARTHEST_PX = 50.0  # from an edge: farther is as far
 COARSE = 0.6  # times a drawing's size: smaller views take drawings of half the size
-CRUMB = 3e-4  # of the squared height of the figure: smaller patches that are seen are noise
 INK_LIKE = 60  # sum of channels: a palette colour so near to the ink is the ink's
-SQUARE = np.ones((3, 3), dtype=np.uint8)
 AROUND = np.ones((2 * BESIDE_PX + 1, 2 * BESIDE_PX + 1), dtype=np.uint8)
-
-Places = tuple[Float[np.ndarray, "h w"], Float[np.ndarray, "h w"]]
-
-
-@dataclass(frozen=True, eq=False)
-class Original:
-    """A drawing as it is on the sheet.
-
-    Attributes:
-        camera: that calibration found.
-        rgba: (height, width, 4) sRGB with straight alpha.
-    """
-
-    camera: Camera
-    rgba: UInt8[np.ndarray, "height width 4"]
-
-
-@dataclass(frozen=True, eq=False)
-class Drawing:
-    """One drawing, agreeing with the others, and the surface that it shows.
-
-    Attributes:
-        camera: that saw it.
-        rgba: (height, width, 4) sRGB with straight alpha.
-        paint: (height, width, 3) of `toonset.nerf.look.flat_paint`.
-        levels: (height, width) depth of the field's surface, 1 to 255 over `Drawings.depths`; 0
-            where there is none, or a mirrored drawing does not hold; None: the surface is the
-            mannequin's.
-        mirrored: it is the mirror image of another.
-        original: how it was drawn; None: just so.
-        limbs: what it shows and the field lacks, for views near it; None: nothing.
-    """
-
-    camera: Camera
-    rgba: UInt8[np.ndarray, "height width 4"]
-    paint: UInt8[np.ndarray, "height width 3"]
-    levels: UInt8[np.ndarray, "height width"] | None
-    mirrored: bool = False
-    original: Original | None = None
-    limbs: Shape | None = None
-
-    @property
-    def as_drawn(self) -> Original:
-        """Return the drawing as it is on the sheet."""
-        return self.original or Original(self.camera, self.rgba)
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,7 +184,7 @@ class Drawings:
         outline, pen = (
             line and replace(line, width_px=line.width_px / 2) for line in (self.outline, self.pen)
         )
-        views = tuple(_half(view) for view in self.views)
+        views = tuple(halved(view) for view in self.views)
         steps = self.steps and replace(
             self.steps, near_px=self.steps.near_px / 2, far_px=self.steps.far_px / 2
         )
@@ -260,139 +215,6 @@ class Drawings:
             if found.pair in ((i, j), (j, i)):
                 return found, 1.0 if found.pair == (i, j) else -1.0
         return None
-
-
-@dataclass(frozen=True, eq=False)
-class Texture:
-    """One drawing, ready to be looked up from other views.
-
-    Attributes:
-        camera: that saw it.
-        whole: (height, width, 4) premultiplied, in [0, 1].
-        drawn_by: the camera that calibration found.
-        drawn: (rows, columns, 4) how it is on the sheet, premultiplied.
-        paint: (height, width, 3) straight colour in [0, 1]: see `Drawing`.
-        labels: (height, width) of this paint.
-        far: (height, width) depth of the surface, the farthest of 3 x 3 pixels; -inf beside it, and
-            just behind the steps of a known shape.
-        to_edge: (height, width) pixels to the outline or the nearest step in depth.
-        rim: what its outline has beyond the surface's.
-        beyond: (height, width) pixels to the drawing and its surface.
-        pen: width in pixels and colour of its lines; None: there are none.
-        figure_px: height of the figure.
-        in_own: (height, width, 3) the paint in the artist's colours.
-    """
-
-    camera: Camera
-    whole: Float[np.ndarray, "height width 4"]
-    drawn_by: Camera
-    drawn: Float[np.ndarray, "rows columns 4"]
-    paint: Float[np.ndarray, "height width 3"]
-    labels: UInt8[np.ndarray, "height width"]
-    far: Float[np.ndarray, "height width"]
-    to_edge: Float[np.ndarray, "height width"]
-    rim: Rim
-    beyond: Float[np.ndarray, "height width"]
-    pen: tuple[float, tuple[int, int, int]] | None
-    figure_px: float
-    in_own: UInt8[np.ndarray, "height width 3"]
-
-    @cached_property
-    def features(self) -> Features:
-        """Return what is carried whole."""
-        inside = self.whole[..., 3] > 0.5
-        drawn = self.in_own / np.float32(255)
-        return features_of(self.paint, self.labels, inside, self.pen, self.figure_px, drawn)
-
-    @cached_property
-    def unlined(self) -> Unlined:
-        """Return its paints without lines and features."""
-        found = self.features
-        inside = (self.whole[..., 3] > 0.5) & (found.numbers == 0)
-        drawn = self.in_own / np.float32(255)
-        return Unlined.of(drawn, found.labels, inside, self.pen, self.figure_px)
-
-    @cached_property
-    def afloat(self) -> Bool[np.ndarray, "height width"]:
-        """Return the pixels that it shows apart from its largest part."""
-        part, areas = sized_parts(self.whole[..., 3] > 0.5)
-        return (part > 0) & (part != areas[1:].argmax() + 1)
-
-    @cached_property
-    def anchors(self) -> Float[np.ndarray, "features 3"]:
-        """Return the world points of the surface at which the features' middles lie."""
-        found = self.features.found
-        middles = np.array([feature.middle for feature in found]).reshape(-1, 2)
-        surface = filled(np.where(np.isfinite(self.far), self.far, np.nan))
-        depths = [np.median(surface[one.rows, one.columns][one.matte > 0.5]) for one in found]
-        return self.camera.unproject(middles + 0.5, np.array(depths))
-
-
-@dataclass(frozen=True, eq=False)
-class Seen:
-    """Projection of surface points into one drawing.
-
-    Attributes:
-        x, y: (h, w) column and row, the first pixel's centre at 0.
-        mask: (h, w) the drawing shows the place.
-    """
-
-    x: Float[np.ndarray, "h w"]
-    y: Float[np.ndarray, "h w"]
-    mask: Bool[np.ndarray, "h w"]
-
-    def moved(self, flow: Float[np.ndarray, "h w 2"] | None, part: float) -> Places:
-        """Return the places with `part` of a displacement added, pixels of the drawing."""
-        if flow is None or part == 0:
-            return self.x, self.y
-        return self.x + np.float32(part) * flow[..., 0], self.y + np.float32(part) * flow[..., 1]
-
-
-def _half(view: Drawing) -> Drawing:
-    """Return a drawing averaged over blocks of 2 x 2 pixels."""
-    even = [(0, size % 2) for size in view.rgba.shape[:2]]
-    paint = np.pad(view.paint, [*even, (0, 0)], mode="edge").astype(np.float32)
-    levels = None if view.levels is None else np.pad(view.levels, even)[::2, ::2].copy()
-    own = _half_size(Original(view.camera, view.rgba))
-    original = None if view.original is None else _half_size(view.original)
-    flat = _rounded(_in_blocks(paint))
-    return Drawing(own.camera, own.rgba, flat, levels, view.mirrored, original, view.limbs)
-
-
-def _half_size(picture: Original) -> Original:
-    even = [(0, size % 2) for size in picture.rgba.shape[:2]]
-    rgba = np.pad(picture.rgba, [*even, (0, 0)]).astype(np.float32)
-    rgba[..., :3] *= rgba[..., 3:] / 255
-    mean = _in_blocks(rgba)
-    mean[..., :3] *= 255 / np.maximum(mean[..., 3:], 1e-6)
-    camera = replace(picture.camera, size_wh=(rgba.shape[1], rgba.shape[0])).resized(0.5)
-    return Original(camera, _rounded(mean))
-
-
-def _in_blocks(picture: Float[np.ndarray, "height width c"]) -> Float[np.ndarray, "rows columns c"]:
-    height, width, channels = picture.shape
-    return picture.reshape(height // 2, 2, width // 2, 2, channels).mean(axis=(1, 3))
-
-
-def _rounded(picture: Float[np.ndarray, "rows columns c"]) -> UInt8[np.ndarray, "rows columns c"]:
-    return (picture + 0.5).clip(0, 255).astype(np.uint8)
-
-
-def levels_of(
-    depth: Float[np.ndarray, "height width"], depths: tuple[float, float]
-) -> UInt8[np.ndarray, "height width"]:
-    """Return depth (nan: none) in levels of `Drawing`."""
-    low, high = depths
-    part = (depth - low) / max(high - low, 1e-12)
-    return np.where(np.isfinite(depth), np.rint(np.nan_to_num(part) * 254) + 1, 0).astype(np.uint8)
-
-
-def depth_of(
-    levels: UInt8[np.ndarray, "height width"], depths: tuple[float, float]
-) -> Float[np.ndarray, "height width"]:
-    """Return the depths of levels: the inverse of `levels_of`."""
-    low, high = depths
-    return np.where(levels > 0, low + (levels - 1.0) / 254 * (high - low), np.nan)
 
 
 def _opaque(paint: UInt8[np.ndarray, "height width 3"]) -> UInt8[np.ndarray, "height width 4"]:
@@ -443,76 +265,3 @@ def _premultiplied(
     whole = rgba / np.float32(255)
     whole[..., :3] *= whole[..., 3:]
     return whole
-
-
-def look_up(
-    texture: Texture,
-    points: Float[np.ndarray, "h w 3"],
-    slack: float,
-    least_px: float,
-    *,
-    faces: bool = False,
-) -> Seen:
-    """Return where places of the surface lie in a drawing, and which of them it shows.
-
-    Args:
-        texture: the drawing.
-        points: world.
-        slack: world units that a place may lie behind the drawing's own surface.
-        least_px: smaller patches and pinholes of what it shows are noise.
-        faces: groups of features may lie FACES times as far behind it.
-    """
-    (x, y), depth, front = places_in(texture.camera, points)
-    border = cv2.BORDER_CONSTANT
-    far = cv2.remap(texture.far, x, y, cv2.INTER_NEAREST, borderMode=border, borderValue=-np.inf)
-    covered = cv2.remap(texture.whole[..., 3], x, y, cv2.INTER_LINEAR, borderMode=border)
-    if faces:
-        grouped = cv2.remap(texture.features.groups, x, y, cv2.INTER_NEAREST) > 0
-        far = far + np.float32((FACES - 1) * slack) * grouped
-    mask = front & (covered > 0.5) & (depth <= far + slack)
-    return Seen(x, y, without_crumbs(mask, least_px))
-
-
-def places_in(
-    camera: Camera, points: Float[np.ndarray, "h w 3"]
-) -> tuple[Places, Float[np.ndarray, "h w"], Bool[np.ndarray, "h w"]]:
-    """Return where world points lie in a picture, their depth, and which are in front.
-
-    The first pixel's centre is at 0; points behind a pinhole lie far beyond the picture.
-    """
-    pixels, depth, front = camera.project_grid(points)
-    x, y = (pixels - 0.5).astype(np.float32)
-    if not front.all():
-        x, y = (np.nan_to_num(at, nan=-1e4) for at in (x, y))
-    return (x, y), depth, front
-
-
-def sample_picture(
-    picture: Shaped[np.ndarray, "height width *channels"], places: Places, mode: int
-) -> Shaped[np.ndarray, "h w *channels"]:
-    """Return a picture's values at places; beyond its edges those of the edge."""
-    return cv2.remap(picture, *places, mode, borderMode=cv2.BORDER_REPLICATE)
-
-
-def filled(depth: Float[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:
-    """Return depth with every gap as deep as the nearest pixel that has one; 0 without any."""
-    seen = np.isfinite(depth)
-    if not seen.any():
-        return np.zeros(depth.shape, dtype=np.float32)
-    return taken(depth, nearest(seen)).astype(np.float32)
-
-
-def crisp_depth(depth: Float[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:
-    """Return depth without gaps and without mixtures of near and far."""
-    return crisp(filled(depth))
-
-
-def crisp(depth: Float[np.ndarray, "height width"]) -> Float[np.ndarray, "height width"]:
-    """Return depth, which has no gaps, without mixtures of near and far.
-
-    A pixel on a step shows the mean of both sides; it goes to the side that it is nearer to.
-    """
-    low, high = cv2.erode(depth, SQUARE), cv2.dilate(depth, SQUARE)
-    nearer = np.minimum(depth, (depth + low) / 2)
-    farther = np.maximum(depth, (depth + high) / 2)
-    return np.where(depth - low < high - depth, nearer, farther)

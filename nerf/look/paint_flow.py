@@ -23,16 +23,9 @@ from jaxtyping import Float
 
 from toonset.camera import Camera
 from toonset.nerf.kernels.threads import side_by_side
-from toonset.nerf.look.drawings import (
-    CRUMB,
-    STEP,
-    Drawings,
-    PairFlow,
-    Seen,
-    Texture,
-    crisp_depth,
-    look_up,
-)
+from toonset.nerf.look.crisp_depth import crisp_depth
+from toonset.nerf.look.drawings import STEP, Drawings, PairFlow
+from toonset.nerf.look.texture import CRUMB, Seen, Texture, look_up
 
 GRID = 133.0  # height of the figure on the finest level, pixels
 LEVELS = ((4, 4.2), (2, 6.0), (1, 8.5))  # times the finest pixel; the window's sigma

@@ -19,9 +19,9 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from toonset.camera import Camera
 from toonset.nerf.look.choose import Look, Shared
-from toonset.nerf.look.drawings import Texture
 from toonset.nerf.look.features import Feature, blots_of, lines_of
 from toonset.nerf.look.paint_flow import between
+from toonset.nerf.look.texture import Texture
 from toonset.raster import dilate
 
 SEEN = 0.35  # share of a feature that its drawing has to see

@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from toonset.nerf.look.drawings import crisp
+from toonset.nerf.look.crisp_depth import crisp
 from toonset.raster import in_rows, nearest, taken
 
 # Of the figure's height: depths this far apart belong to two surfaces, in one round after another

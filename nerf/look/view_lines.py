@@ -12,9 +12,10 @@ from jaxtyping import Bool, Float
 
 from toonset.nerf.hull.mannequin_shape import FINER, ShapeView
 from toonset.nerf.look.choose import Look
-from toonset.nerf.look.drawings import Drawings, sample_picture
+from toonset.nerf.look.drawings import Drawings
 from toonset.nerf.look.drawn_view import SOLID, Geometry
 from toonset.nerf.look.outline import crisp_outline, inked_outline, without_noise
+from toonset.nerf.look.places import sample_picture
 from toonset.nerf.look.silhouette import between_outlines, smooth_outline
 from toonset.nerf.look.step_lines import draw_steps
 from toonset.raster import dilate, sized_parts

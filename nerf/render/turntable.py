@@ -22,7 +22,7 @@ from toonset.dataset.silhouettes.mask import mask_of
 from toonset.errors import UsageError
 from toonset.nerf.fields.trained_field import TrainedField
 from toonset.nerf.hull.hull import Hull
-from toonset.nerf.look.drawings import Original
+from toonset.nerf.look.drawing import Original
 
 RING = math.radians(15)  # above or below the sheet's elevation: further ones are no part of a turn
 SAME = math.radians(1)  # nearer drawings are one direction

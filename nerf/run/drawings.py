@@ -35,7 +35,8 @@ from toonset.dataset.images.picture import MAX_PIXELS, encode_png, load_rgba
 from toonset.errors import BundleError, CameraError
 from toonset.json_file import Byte, Number, Share, Size
 from toonset.nerf.hull.mannequin_shape import MOST_FACES, MOST_STEPS, Shape
-from toonset.nerf.look.drawings import Drawing, Drawings, Original, PairFlow
+from toonset.nerf.look.drawing import Drawing, Original
+from toonset.nerf.look.drawings import Drawings, PairFlow
 from toonset.nerf.look.outline import LONGEST_PX, Outline
 from toonset.nerf.look.shade import Shade
 from toonset.nerf.look.step_lines import StepLines

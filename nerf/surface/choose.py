@@ -23,7 +23,8 @@ from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 
 from toonset.camera import Camera
 from toonset.dataset.mesh.rasterize import depth_map
-from toonset.nerf.look.drawings import SQUARE, Places, sample_picture
+from toonset.nerf.look.crisp_depth import SQUARE
+from toonset.nerf.look.places import Places, sample_picture
 from toonset.nerf.surface.paint import Paint
 from toonset.nerf.surface.unwrap import areas, neighbours
 

@@ -14,8 +14,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 from scipy import ndimage
 
-from toonset.nerf.look.drawings import SQUARE, Drawings, Texture
+from toonset.nerf.look.crisp_depth import SQUARE
+from toonset.nerf.look.drawings import Drawings
 from toonset.nerf.look.step_lines import step_edges
+from toonset.nerf.look.texture import Texture
 from toonset.nerf.surface.strokes import SOFT, lines_of, strokes_of
 from toonset.raster import depth_inside, distance_to, nearest, parts, sized_parts
 

@@ -16,7 +16,8 @@ from jaxtyping import Float, Int, UInt8
 from toonset.dataset.mesh.rasterize import depth_map
 from toonset.errors import BundleError
 from toonset.nerf.fields.trained_field import TrainedField
-from toonset.nerf.look.drawings import Drawings, Places, sample_picture
+from toonset.nerf.look.drawings import Drawings
+from toonset.nerf.look.places import Places, sample_picture
 from toonset.nerf.options import MeshOptions
 from toonset.nerf.surface.choose import chosen, merits
 from toonset.nerf.surface.files import Surface

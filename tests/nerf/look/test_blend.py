@@ -26,7 +26,8 @@ from tests.nerf.look.painted import (
 )
 from toonset.nerf.look.blend import _extended, blend_view
 from toonset.nerf.look.build import drawings_of
-from toonset.nerf.look.drawings import Drawings, Original
+from toonset.nerf.look.drawing import Original
+from toonset.nerf.look.drawings import Drawings
 from toonset.nerf.look.drawn_view import DRAWN, GUESSED, MIRRORED
 from toonset.nerf.look.outline import Outline
 from toonset.nerf.render.layers import color_picture

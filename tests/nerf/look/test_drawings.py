@@ -19,11 +19,14 @@ from tests.nerf.look.painted import (
     surface,
 )
 from toonset.dataset.bundle.scene import Frame, Scene
-from toonset.nerf.look import drawings as module
 from toonset.nerf.look.build import drawings_of
+from toonset.nerf.look.crisp_depth import crisp_depth
+from toonset.nerf.look.drawing import depth_of as depth_of_levels
+from toonset.nerf.look.drawing import levels_of
 from toonset.nerf.look.drawings import Drawings
 from toonset.nerf.look.outline import crisp_outline, outline_of, without_crumbs
 from toonset.nerf.look.paint_flow import neighbours
+from toonset.nerf.look.texture import look_up
 
 
 def test_the_outlines_width_is_measured() -> None:
@@ -62,19 +65,19 @@ def test_crumbs_pinholes_and_holes_go_up_to_their_size() -> None:
 
 def test_levels_of_depth_come_back_within_half_a_level() -> None:
     depth = np.array([[np.nan, -1.0, 0.3, 2.0]])
-    levels = module.levels_of(depth, (-1.0, 2.0))
-    back = module.depth_of(levels, (-1.0, 2.0))
+    levels = levels_of(depth, (-1.0, 2.0))
+    back = depth_of_levels(levels, (-1.0, 2.0))
     assert levels.tolist()[0][:2] == [0, 1]
     assert levels[0, 3] == 255
     np.testing.assert_allclose(back[0, 1:], depth[0, 1:], atol=1.5 / 254)
-    np.testing.assert_array_equal(module.levels_of(back, (-1.0, 2.0)), levels)
+    np.testing.assert_array_equal(levels_of(back, (-1.0, 2.0)), levels)
 
 
 def test_a_drawing_shows_its_own_side_only(egg: Drawings) -> None:
     camera = camera_at(0.6)
     points, seen = surface(camera)
-    front = module.look_up(egg.textures[0], points, 0.05, 4)
-    back = module.look_up(egg.textures[4], points, 0.05, 4)
+    front = look_up(egg.textures[0], points, 0.05, 4)
+    back = look_up(egg.textures[4], points, 0.05, 4)
     there = front.mask[seen].mean()
     assert 0.75 < there < 1
     assert back.mask[seen].mean() < 0.2
@@ -86,7 +89,7 @@ def test_depth_has_no_mixtures_of_near_and_far() -> None:
     depth[2:7, 2:7] = 1.0
     depth[2:7, 4] = 1.7
     depth[2:7, 5:7] = 2.0
-    crisp = module.crisp_depth(depth)
+    crisp = crisp_depth(depth)
     assert crisp[4, 4] == pytest.approx(1.85)
     assert np.isfinite(crisp).all()
 

@@ -11,7 +11,8 @@ import pytest
 
 from toonset.camera import Camera, rotation_distance
 from toonset.nerf.fields.trained_field import TrainedField
-from toonset.nerf.look.drawings import Drawing, Drawings
+from toonset.nerf.look.drawing import Drawing
+from toonset.nerf.look.drawings import Drawings
 from toonset.nerf.render.turntable import (
     FILL,
     RING,

@@ -14,7 +14,8 @@ from tests.nerf.look.painted import AXES, INK, PALETTE, camera_at, paint_of
 from toonset.dataset.mesh.gltf_file import open_gltf
 from toonset.dataset.mesh.load import load_mesh
 from toonset.errors import OutputError, SetupError
-from toonset.nerf.look.drawings import Drawing, Drawings, levels_of
+from toonset.nerf.look.drawing import Drawing, levels_of
+from toonset.nerf.look.drawings import Drawings
 from toonset.nerf.look.outline import Outline
 from toonset.nerf.surface import unwrap as unwrapping
 from toonset.nerf.surface.files import Surface
