@@ -99,7 +99,6 @@ LONG = {  # lines of the files that have more: they are only to become shorter
     "dataset/split/ruled_lines.py": 408,
     "dataset/split/sheet.py": 420,
     "dataset/split/warnings.py": 475,
-    "nerf/render/vectors.py": 584,
     "palette/extract.py": 516,
 }
 

@@ -27,7 +27,8 @@ from toonset.nerf.render.bezier import Curve
 from toonset.nerf.render.layers import Rendering
 from toonset.nerf.render.open_raster import LINES as LINES_NAME
 from toonset.nerf.render.open_raster import paint_names
-from toonset.nerf.render.vectors import LINES, Region, Vectors, trace
+from toonset.nerf.render.stack import LINES, Region
+from toonset.nerf.render.vectors import Vectors, trace
 
 TRACED = "drawn"  # the layer that can be
 STEPS = 100  # of a coordinate per pixel

@@ -15,8 +15,9 @@ from toonset.nerf.look.drawings import Drawings
 from toonset.nerf.look.drawn_view import DrawnView
 from toonset.nerf.look.outline import Outline
 from toonset.nerf.render.bezier import fit_closed, flattened
+from toonset.nerf.render.stack import LINES, OFF_PX, Region
 from toonset.nerf.render.svg import check_traced, encode_svg, svg_of
-from toonset.nerf.render.vectors import LINES, OFF_PX, Region, Vectors, trace
+from toonset.nerf.render.vectors import Vectors, trace
 from toonset.raster import erode, is_uniform
 
 SVG = "{http://www.w3.org/2000/svg}"
