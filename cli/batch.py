@@ -174,7 +174,9 @@ def batch(
     versions touch. OUT/index.html shows all sheets, OUT/batch.sqlite is the table of what is done.
     Exit code 3 when sheets have failed; the others are done then.
     """
-    from toonset.apps.batch.batch import Request, forget_sheets, merge_shards, run, status_of
+    from toonset.apps.batch.afterwards import forget_sheets, merge_shards, status_of
+    from toonset.apps.batch.batch import run
+    from toonset.apps.batch.request import Request
     from toonset.cli.common.verb_stages import VERBS
 
     os.environ["OMP_NUM_THREADS"] = "1"  # a sheet has one core; must precede torch

@@ -19,8 +19,9 @@ from pathlib import Path
 from typing import Protocol
 
 from toonset.apps.batch.job import Job, Outcome, read_stamp, tidy
+from toonset.apps.batch.rows import SheetRow, StageRow, State
 from toonset.apps.batch.stages import dependents
-from toonset.apps.batch.table import BAD, SheetRow, StageRow, State, Table
+from toonset.apps.batch.table import BAD, Table
 from toonset.errors import OutputError, ToonsetError
 
 try:

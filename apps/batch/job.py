@@ -28,8 +28,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 from toonset import lock
+from toonset.apps.batch.rows import StageRow
 from toonset.apps.batch.stages import BUNDLE, STAGES, Verbs, dependents, line_of, value_of
-from toonset.apps.batch.table import StageRow
 from toonset.errors import OutputError, ToonsetError, one_line, printable
 from toonset.write import write_json
 

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from toonset.apps.batch.job import LOG, Job, Outcome, last_lines, last_stage, over_memory
-from toonset.apps.batch.table import StageRow
+from toonset.apps.batch.rows import StageRow
 from toonset.write import ENDINGS
 
 WORKER_MB = 1500  # of memory, for a sheet of usual size and its training

@@ -166,7 +166,8 @@ def _shares(text: str) -> tuple[float, ...]:
 
 def _table(batch: Path) -> Table:
     """Open the table of a batch."""
-    from toonset.apps.batch.table import TABLE, Table, tables_in
+    from toonset.apps.batch.table import Table
+    from toonset.apps.batch.table_file import TABLE, tables_in
 
     if TABLE not in (found := tables_in(batch)) and found:
         raise UsageError(f"{batch}: is in parts still; run `toonset batch --merge` on it first")

@@ -22,8 +22,8 @@ from PIL import Image
 
 import toonset as ts
 from toonset import lock
+from toonset.apps.batch.rows import SheetRow, StageRow
 from toonset.apps.batch.stages import BUNDLE, RANKS, RUN, STAGES
-from toonset.apps.batch.table import SheetRow, StageRow
 from toonset.errors import PictureError
 from toonset.html_page import html_page, json_text
 from toonset.write import new_files

@@ -9,8 +9,9 @@ from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+from toonset.apps.batch.rows import SheetRow, StageRow
 from toonset.apps.batch.stages import dependents
-from toonset.apps.batch.table import BAD, SheetRow, StageRow
+from toonset.apps.batch.table import BAD
 from toonset.errors import counted, duration
 
 LIVE_S, LOG_S = 0.5, 30.0  # between lines on a terminal; in a log

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import toonset as ts
+from toonset.apps.batch.rows import SheetRow
 from toonset.apps.batch.stages import BUNDLE
-from toonset.apps.batch.table import SheetRow
 from toonset.dataset.bundle_files import (
     PINHOLE,
     BundleFiles,

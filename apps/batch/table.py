@@ -3,262 +3,29 @@
 A sheet is claimed as a whole, by one UPDATE, under a lease that its runner renews; a runner is one
 `toonset batch` with its workers. Who dies loses its leases, not its results: those are folders that
 appear by a rename, each with a stamp beside it (`toonset.apps.batch.job`), and whoever claims the
-sheet next finds them.
-
-Every write is one short transaction in write-ahead mode, so that several runners and readers share
-the table. SQLite needs a file system with locks: across machines, give each its own table (--shard)
-or let one machine do the writing (--ray).
+sheet next finds them. How the file is opened and shared: `toonset.apps.batch.table_file`.
 """
 
 from __future__ import annotations
 
-import contextlib
 import itertools
 import json
-import os
-import re
 import sqlite3
 import time
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field, fields, replace
-from pathlib import Path
-from typing import Any, Literal
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
+from dataclasses import replace
 
-from toonset.apps.batch.stages import RANKS, Entry, dependents
-from toonset.errors import OutputError, ToonsetError
+from toonset.apps.batch.rows import Plan, SheetRow, StageRow, sheet_of
+from toonset.apps.batch.stages import RANKS, dependents
+from toonset.apps.batch.table_file import TableFile
+from toonset.errors import ToonsetError
 
-SCHEMA = 1  # in the table's user_version
-TABLE, SHARDS = "batch.sqlite", "batch-*of*.sqlite"  # of a batch; of its parts
 AT_ONCE = 500  # sheets of one transaction
-PATIENCE_S = 60.0  # for another process's transaction; each takes milliseconds
 BAD = ("quarantined", "failed")  # the worse first
-State = Literal["waiting", "running", "done", "failed", "quarantined"]
-
-TABLES = """
-CREATE TABLE sheets (
-    name TEXT PRIMARY KEY,
-    position INTEGER NOT NULL,
-    entry TEXT NOT NULL,              -- JSON of an Entry
-    state TEXT NOT NULL,
-    worker TEXT NOT NULL DEFAULT '',  -- runner that has claimed it
-    lease REAL NOT NULL DEFAULT 0,    -- until then, seconds since 1970
-    crashes INTEGER NOT NULL DEFAULT 0,
-    kills INTEGER NOT NULL DEFAULT 0, -- of its worker, from outside
-    planned REAL NOT NULL DEFAULT 0   -- when its inputs or options changed last
-);
-CREATE INDEX by_turn ON sheets (state, crashes + kills, position);
-CREATE TABLE stages (
-    sheet TEXT NOT NULL,
-    stage TEXT NOT NULL,
-    rank INTEGER NOT NULL,            -- order of the stages
-    key TEXT NOT NULL,                -- hash of inputs, options, versions and the stage before
-    state TEXT NOT NULL,
-    attempts INTEGER NOT NULL DEFAULT 0,
-    worker TEXT NOT NULL DEFAULT '',
-    ended REAL NOT NULL DEFAULT 0,
-    wall_s REAL NOT NULL DEFAULT 0,
-    cpu_s REAL NOT NULL DEFAULT 0,
-    peak_mb REAL NOT NULL DEFAULT 0,
-    verdict TEXT NOT NULL DEFAULT '',
-    facts TEXT NOT NULL DEFAULT '{}',
-    error TEXT NOT NULL DEFAULT '',
-    log TEXT NOT NULL DEFAULT '',
-    output TEXT NOT NULL DEFAULT '',  -- hash of what it wrote
-    PRIMARY KEY (sheet, stage)
-) WITHOUT ROWID;
-CREATE TABLE files (                  -- hashes of inputs, for as long as they look the same
-    path TEXT PRIMARY KEY, looks TEXT NOT NULL, hash TEXT NOT NULL
-) WITHOUT ROWID;
-CREATE TABLE store (                  -- where results are, if not beside the table
-    url TEXT PRIMARY KEY
-) WITHOUT ROWID;
-"""
 
 
-@dataclass(frozen=True)
-class StageRow:
-    """One stage of one sheet.
-
-    Attributes:
-        stage: its name, as the verb's.
-        key: hash of inputs, options, versions and the stage before.
-        state: waiting, done or failed.
-        attempts: how often it was begun.
-        worker: who ended it, as host:process.
-        ended: seconds since 1970; 0 if it has not.
-        wall_s: how long it took.
-        cpu_s: of all its threads.
-        peak_mb: most memory of its process meanwhile.
-        verdict: ok, weak, ambiguous or failed, where the stage has one.
-        facts: what the page shows besides, small.
-        error: the line that says why it failed.
-        log: last lines of what it printed, if it failed.
-        output: hash of what it wrote.
-    """
-
-    stage: str
-    key: str
-    state: State = "waiting"
-    attempts: int = 0
-    worker: str = ""
-    ended: float = 0.0
-    wall_s: float = 0.0
-    cpu_s: float = 0.0
-    peak_mb: float = 0.0
-    verdict: str = ""
-    facts: Mapping[str, Any] = field(default_factory=dict)
-    error: str = ""
-    log: str = ""
-    output: str = ""
-
-
-COLUMNS = tuple(one.name for one in fields(StageRow))
-
-
-@dataclass(frozen=True)
-class SheetRow:
-    """One sheet with its stages, in order.
-
-    Attributes:
-        entry: what the manifest says of it.
-        position: among the batch's sheets.
-        state: of the sheet as a whole.
-        worker: runner that has claimed it.
-        crashes: of its worker, caused by the sheet.
-        planned: when its inputs or options changed last, seconds since 1970.
-        stages: in the order in which they run.
-    """
-
-    entry: Entry
-    position: int
-    state: State
-    worker: str
-    crashes: int
-    planned: float
-    stages: tuple[StageRow, ...]
-
-    @property
-    def name(self) -> str:
-        """Return the sheet's name."""
-        return self.entry.name
-
-    @property
-    def newest(self) -> float:
-        """Return when something of it changed last."""
-        return max((self.planned, *(row.ended for row in self.stages)))
-
-    @property
-    def verdict(self) -> str:
-        """Return the cameras' verdict, "" where there is none yet."""
-        return next((row.verdict for row in self.stages if row.stage == "calibrate"), "")
-
-    @property
-    def error(self) -> str:
-        """Return why it failed, "" where it did not."""
-        return next((row.error for row in self.stages if row.error), "")
-
-
-@dataclass(frozen=True)
-class Plan:
-    """What a sheet is to have.
-
-    Attributes:
-        entry: the sheet.
-        position: among the batch's sheets.
-        keys: the key of every stage, in order.
-    """
-
-    entry: Entry
-    position: int
-    keys: Mapping[str, str]
-
-
-def tables_in(out: Path) -> list[str]:
-    """Return the names of the tables in a batch's folder: its own first, then those of parts."""
-    names = sorted(path.name for path in out.glob(SHARDS)) if out.is_dir() else []
-    parts = [name for name in names if re.fullmatch(r"batch-\d+of\d+\.sqlite", name)]
-    return [TABLE] * (out / TABLE).is_file() + parts
-
-
-class Table:
-    """An open table. One connection: of one process, used by one thread."""
-
-    def __init__(self, path: Path, *, make: bool = False, alone: bool = False) -> None:
-        """Open a table.
-
-        Args:
-            path: the file.
-            make: make it if it is not there.
-            alone: make it without a write-ahead file, which processes of one machine only share:
-                for the parts of a batch on a shared disk.
-
-        Raises:
-            OutputError: it cannot be read or written.
-            ToonsetError: it is no table of a batch, or of a newer toonset.
-        """
-        self.path = path
-        if not make and not path.is_file():
-            raise ToonsetError(f"{path.parent}: has no {path.name}; name the -o of a toonset batch")
-        with self._errors():
-            wal = path.with_name(f"{path.name}-wal")
-            is_whole = not wal.exists() or not wal.stat().st_size
-            is_fixed = not make and is_whole and not os.access(path.parent, os.W_OK)
-            place = f"{path.absolute().as_uri()}?immutable=1" if is_fixed else path
-            self._db = sqlite3.connect(
-                place, timeout=PATIENCE_S, isolation_level=None, uri=is_fixed
-            )
-            self._db.row_factory = sqlite3.Row
-            self._open(make=make, alone=alone)
-
-    def _open(self, *, make: bool, alone: bool) -> None:
-        version = self._db.execute("PRAGMA user_version").fetchone()[0]
-        if version > SCHEMA:
-            raise ToonsetError(f"{self.path}: is of a newer toonset; install that one")
-        self._db.execute("PRAGMA synchronous = NORMAL")  # a lost commit is a sheet found done
-        if version != SCHEMA:
-            none = ToonsetError(f"{self.path}: is no table of toonset batch; choose another -o")
-            if not make:
-                raise none
-            with self.transaction():
-                if self._db.execute("PRAGMA user_version").fetchone()[0] == 0:  # nobody else has
-                    if self._db.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
-                        raise none
-                    for statement in TABLES.split(";"):
-                        self._db.execute(statement)
-                    self._db.execute(f"PRAGMA user_version = {SCHEMA}")
-        if make and not alone:
-            with contextlib.suppress(sqlite3.OperationalError):  # somebody reads: the next time
-                self._db.execute("PRAGMA journal_mode = WAL")
-
-    def close(self) -> None:
-        """Close the connection; the last one tidies the write-ahead file away."""
-        with self._errors():
-            self._db.close()
-
-    @contextmanager
-    def _errors(self) -> Iterator[None]:
-        """Turn what SQLite says of the file or its disk into one line."""
-        try:
-            yield
-        except sqlite3.DatabaseError as error:
-            raise OutputError(
-                f"{self.path}: cannot be used ({error}); make room, make it writable, or choose "
-                "another -o"
-            ) from error
-
-    @contextmanager
-    def transaction(self) -> Iterator[sqlite3.Connection]:
-        """Do what is within the block at once, as the only writer, or not at all."""
-        with self._errors():
-            self._db.execute("BEGIN IMMEDIATE")
-            try:
-                yield self._db
-            except BaseException:
-                if self._db.in_transaction:
-                    self._db.execute("ROLLBACK")
-                raise
-            self._db.execute("COMMIT")
+class Table(TableFile):
+    """An open table: what is read of it, and what may change in it."""
 
     # ---- reading --------------------------------------------------------------------------------
 
@@ -273,11 +40,11 @@ class Table:
             of_sheet: list[sqlite3.Row] = []
             for row in found:
                 if of_sheet and row["name"] != of_sheet[0]["name"]:
-                    yield _sheet(of_sheet)
+                    yield sheet_of(of_sheet)
                     of_sheet = []
                 of_sheet.append(row)
             if of_sheet:
-                yield _sheet(of_sheet)
+                yield sheet_of(of_sheet)
 
     def row(self, name: str) -> SheetRow | None:
         """Return one sheet; None if there is none of that name."""
@@ -288,7 +55,7 @@ class Table:
                 "WHERE s.name = ? ORDER BY t.rank",
                 (name,),
             ).fetchall()
-        return _sheet(found) if found else None
+        return sheet_of(found) if found else None
 
     def names(self) -> list[str]:
         """Return the names of all sheets."""
@@ -573,23 +340,3 @@ def _worst(states: Iterable[str]) -> str:
     """Return the state of a sheet that nothing is to be done for."""
     found = {*states}
     return next((state for state in BAD if state in found), "done")
-
-
-def _sheet(rows: Sequence[sqlite3.Row]) -> SheetRow:
-    """Return a sheet of its rows, one for each stage."""
-    first, entry = rows[0], json.loads(rows[0]["entry"])
-    entry["sheets"] = tuple(entry["sheets"])
-    entry["words"] = {stage: tuple(words) for stage, words in entry["words"].items()}
-    return SheetRow(
-        Entry(**entry),
-        first["position"],
-        first["sheet_state"],
-        first["runner"],
-        first["crashes"],
-        first["planned"],
-        tuple(_stage(row) for row in rows if row["stage"] is not None),
-    )
-
-
-def _stage(row: sqlite3.Row) -> StageRow:
-    return StageRow(**{name: row[name] for name in COLUMNS} | {"facts": json.loads(row["facts"])})

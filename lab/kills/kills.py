@@ -15,7 +15,9 @@ from pathlib import Path
 
 from lab.bench.batch.sheets import MANIFEST, write_sheets
 from lab.contents import contents
-from toonset.apps.batch.table import TABLE, SheetRow, Table
+from toonset.apps.batch.rows import SheetRow
+from toonset.apps.batch.table import Table
+from toonset.apps.batch.table_file import TABLE
 
 STAGES = ("--stages", "calibrate,palette")
 TIME_LIMIT_S = 30  # hanging sheets end so

@@ -9,8 +9,10 @@ from pathlib import Path
 import pytest
 
 from lab.kills.kills import faults
+from toonset.apps.batch.rows import Plan, StageRow
 from toonset.apps.batch.stages import Entry
-from toonset.apps.batch.table import TABLE, Plan, StageRow, Table
+from toonset.apps.batch.table import Table
+from toonset.apps.batch.table_file import TABLE
 
 ROOT = Path(__file__).resolve().parents[2]
 

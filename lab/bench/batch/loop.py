@@ -12,8 +12,10 @@ from pathlib import Path
 
 from toonset.apps.batch.dispatch import Limits, Runner
 from toonset.apps.batch.job import Job, Outcome
+from toonset.apps.batch.rows import Plan, StageRow
 from toonset.apps.batch.stages import Entry
-from toonset.apps.batch.table import TABLE, Plan, StageRow, Table
+from toonset.apps.batch.table import Table
+from toonset.apps.batch.table_file import TABLE
 
 KEYS = {"calibrate": "0" * 64, "palette": "1" * 64}
 AT_ONCE = 1000  # sheets that run

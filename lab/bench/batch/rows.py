@@ -9,8 +9,8 @@ from typing import Any
 
 from PIL import Image
 
+from toonset.apps.batch.rows import SheetRow, StageRow
 from toonset.apps.batch.stages import Entry
-from toonset.apps.batch.table import SheetRow, StageRow
 
 STAGES = ("calibrate", "palette", "train", "render")
 # State, verdict of the cameras: what a reader looks at first comes first.

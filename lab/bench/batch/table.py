@@ -7,8 +7,10 @@ from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
+from toonset.apps.batch.rows import Plan, StageRow
 from toonset.apps.batch.stages import Entry
-from toonset.apps.batch.table import TABLE, Plan, StageRow, Table
+from toonset.apps.batch.table import Table
+from toonset.apps.batch.table_file import TABLE
 
 KEYS = {"calibrate": "0" * 64, "palette": "1" * 64}
 

@@ -13,7 +13,8 @@ from pathlib import Path
 
 from lab.bench.batch.cluster import make_cluster
 from lab.bench.batch.sheets import MANIFEST
-from toonset.apps.batch.table import TABLE, Table
+from toonset.apps.batch.table import Table
+from toonset.apps.batch.table_file import TABLE
 
 CHOSEN = ("--stages", "calibrate,palette")
 LOOK_S = 0.5  # between looks at the parent's memory

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from playwright.sync_api import Page
 
 from lab.bench.batch.rows import FIRST_FIRST, sheet
-from toonset.apps.batch.table import SheetRow
+from toonset.apps.batch.rows import SheetRow
 
 
 def one_of_each() -> list[SheetRow]:

@@ -22,8 +22,10 @@ from PIL import Image
 
 from tests.conftest import Outcome, contents, run_here
 from toonset.apps.batch import pack as verb
+from toonset.apps.batch.rows import Plan, StageRow
 from toonset.apps.batch.stages import Entry
-from toonset.apps.batch.table import TABLE, Plan, StageRow, Table
+from toonset.apps.batch.table import Table
+from toonset.apps.batch.table_file import TABLE
 from toonset.dataset.bundle.bundle import read_bundle
 from toonset.dataset.images.picture import encode_png
 

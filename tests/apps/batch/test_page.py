@@ -19,8 +19,8 @@ from lab.bench.batch.rows import FIRST_FIRST, draw_thumbs, many, sheet
 from tests.apps.batch.page_under_test import Shown, names_of, one_of_each
 from toonset.apps.batch import page as page_module
 from toonset.apps.batch.page import write_page
+from toonset.apps.batch.rows import SheetRow
 from toonset.apps.batch.stages import RANKS
-from toonset.apps.batch.table import SheetRow
 
 Open = Callable[..., Shown]
 HOSTILE = (

@@ -10,8 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from toonset.apps.batch.rows import Plan, StageRow
 from toonset.apps.batch.stages import Entry
-from toonset.apps.batch.table import TABLE, Plan, StageRow, Table
+from toonset.apps.batch.table import Table
+from toonset.apps.batch.table_file import TABLE
 from toonset.errors import OutputError, ToonsetError
 
 KEYS = {"calibrate": "k1", "palette": "k2", "train": "k3"}

@@ -16,7 +16,9 @@ from toonset.apps.batch import dispatch, job
 from toonset.apps.batch.dispatch import Limits, Runner, alive, home_of, release_dead
 from toonset.apps.batch.job import Job, Outcome
 from toonset.apps.batch.local import LocalWorkers, usual_workers
-from toonset.apps.batch.table import TABLE, SheetRow, Table
+from toonset.apps.batch.rows import SheetRow
+from toonset.apps.batch.table import Table
+from toonset.apps.batch.table_file import TABLE
 from toonset.errors import OutputError, ToonsetError
 
 MOST_MB = 3000  # more than these tests' process has, less than a sheet that eats
