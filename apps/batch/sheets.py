@@ -1,61 +1,25 @@
-"""List the sheets of a batch: files, folders, patterns and URLs, or manifests that say more.
-
-A manifest is a CSV table or a JSONL file with one object per sheet. Its columns or keys:
-
-    sheet       the drawing, or a folder of views; several as a list, in CSV with ";" between
-    name        of its folder and in the data set (default: from the file's name)
-    mesh        its mannequin, as of `toonset calibrate --mesh`
-    views       what its views show, as of `--views`
-    calibrate_options, palette_options, ...   of a stage, as typed after its verb
-    character, license, source       for the data set
-
-Paths are relative to the manifest's folder, and must lie in it, or in the folder of --root.
-"""
+"""List the sheets of a batch: files, folders, patterns and URLs, or manifests that say more."""
 
 from __future__ import annotations
 
-import csv
 import fnmatch
 import glob
-import io
 import os
 import re
 import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
+from toonset.apps.batch.given import Given, clean_name, stem_of
+from toonset.apps.batch.manifest import MANIFESTS, OPTIONS, manifest_sheets
 from toonset.apps.batch.stages import STAGES, Entry, Verbs, as_words, files_among, value_of
 from toonset.apps.batch.storage import file_name, find, is_url
-from toonset.errors import SheetError, UsageError, as_text, one_line, printable
+from toonset.errors import SheetError, UsageError, as_text, printable
 
-MANIFESTS = (".csv", ".jsonl")
 LONGEST_NAME = 100  # bytes: a folder of toonset's own adds some, 255 is the most
 SOME = 5  # names that a line says
 WILD = re.compile(r"[*?\[]")
 SPLIT = "split.json"  # in a folder that `toonset split` wrote
-PLAIN = ("sheet", "name", "mesh", "views", "character", "license", "source")
-OPTIONS = "_options"  # ends the name of a stage's column
-
-
-@dataclass(frozen=True)
-class Given:
-    """One sheet as somebody named it.
-
-    Attributes:
-        where: that was, for messages.
-        root: what its paths are relative to.
-        inside: whether they must lie in there.
-        name: of the sheet, made from its file's where nobody gave one.
-        values: by column.
-    """
-
-    where: str
-    root: Path
-    inside: bool
-    name: str
-    values: Mapping[str, Any]
 
 
 def list_sheets(
@@ -135,10 +99,10 @@ def _given(
         if found != [place]:
             found = [url for url in found if Path(url).suffix.lower() in ENDINGS]
         for url in found:
-            yield Given(url, here, False, clean_name(_stem(file_name(url))), {"sheet": url})
+            yield Given(url, here, False, clean_name(stem_of(file_name(url))), {"sheet": url})
         return
     if path.suffix.lower() in MANIFESTS and not path.is_dir():
-        yield from _manifest(path, root)
+        yield from manifest_sheets(path, root)
         return
     if WILD.search(place) and not path.exists():
         base = Path(WILD.split(place)[0] + "x").parent  # up to the first wild part
@@ -222,101 +186,6 @@ def some_of(names: Sequence[str]) -> str:
 
 def _is_within(file: Path, folder: Path) -> bool:
     return Path(os.path.abspath(file)).is_relative_to(os.path.abspath(folder))
-
-
-def clean_name(text: str) -> str:
-    """Return a text as the name of a sheet: what may stand in no folder's name is "_"."""
-    return re.sub(r"[^\w-]+", "_", unicodedata.normalize("NFC", text)).strip("_").lstrip("-")
-
-
-def _stem(name: str) -> str:
-    """Return a file's name without its ending."""
-    return name.rsplit(".", 1)[0] if "." in name[1:] else name
-
-
-def _manifest(path: Path, root: Path | None) -> Iterator[Given]:
-    """Yield the sheets of a manifest.
-
-    Raises:
-        SheetError: it cannot be read, or has a column that means nothing.
-    """
-    from toonset.read import read_whole
-
-    data = read_whole(path, "manifest", SheetError)
-    reader = _csv_rows if path.suffix.lower() == ".csv" else _jsonl_rows
-    base = Path(os.path.abspath(root or path.parent))
-    for line, values in reader(path, data):
-        where = f"{path}: line {line}"
-        _check_values(where, values)
-        sheets = _sheets_of(values)
-        if not sheets:
-            raise SheetError(f"{where}: names no sheet; give its picture under 'sheet'")
-        name = values.get("name") or clean_name(_stem(file_name(sheets[0].replace("\\", "/"))))
-        yield Given(where, base, True, name, {**values, "sheet": sheets})
-
-
-def _csv_rows(path: Path, data: bytes) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Yield line and values of a CSV manifest; empty cells are left out."""
-    try:
-        rows = csv.reader(io.StringIO(data.decode("utf-8-sig"), newline=""), strict=True)
-        head = [cell.strip() for cell in next(rows)]
-        if len(head) == 1 and ";" in head[0]:
-            raise SheetError(f"{path}: line 1: has ';' between cells; save it with ','")
-        _check_columns(f"{path}: line 1", head)
-        if double := next((name for name in head if head.count(name) > 1), None):
-            raise SheetError(f"{path}: has two columns {double!r}; take one out")
-        for row in rows:
-            if len(row) > len(head):
-                raise SheetError(f"{path}: line {rows.line_num}: has more cells than columns")
-            values = {name: cell.strip() for name, cell in zip(head, row, strict=False)}
-            if any(values.values()):
-                yield rows.line_num, {name: cell for name, cell in values.items() if cell}
-    except UnicodeDecodeError as error:
-        raise SheetError(f"{path}: is no UTF-8 text; save it as UTF-8") from error
-    except csv.Error as error:
-        raise SheetError(f"{path}: is no CSV ({one_line(error)}); export it again") from error
-
-
-def _jsonl_rows(path: Path, data: bytes) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Yield line and values of a JSONL manifest."""
-    from toonset.read import parse_json
-
-    for number, line in enumerate(data.split(b"\n"), 1):
-        if not line.strip():
-            continue
-        values = parse_json(line, f"{path}: line {number}", SheetError)
-        if not isinstance(values, dict):
-            raise SheetError(f"{path}: line {number}: is no JSON object; write one per sheet")
-        _check_columns(f"{path}: line {number}", values)
-        for name, value in values.items():
-            texts = value if isinstance(value, list) and name == "sheet" else [value]
-            if not all(isinstance(text, str) for text in texts):
-                raise SheetError(f"{path}: line {number}: {name!r} is no text; quote it")
-        yield number, {name: value for name, value in values.items() if value}
-
-
-def _check_values(where: str, values: Mapping[str, Any]) -> None:
-    """Refuse text that no file's name can hold."""
-    for name, value in values.items():
-        if "\0" in "".join(value):
-            raise SheetError(f"{where}: {name!r} holds a zero character; take it out")
-
-
-def _check_columns(where: str, names: Iterable[str]) -> None:
-    """Refuse a column that means nothing."""
-    from toonset.errors import did_you_mean
-
-    known = [*PLAIN, *(f"{stage}{OPTIONS}" for stage in STAGES)]
-    for name in names:
-        if name not in known:
-            said = did_you_mean(name, known) or f"known are {', '.join(known)}"
-            raise SheetError(f"{where}: {name!r} is no column of a manifest; {said}")
-
-
-def _sheets_of(values: Mapping[str, Any]) -> list[str]:
-    sheets = values.get("sheet", [])
-    parts = sheets if isinstance(sheets, list) else sheets.split(";")
-    return [part.strip() for part in parts if part.strip()]
 
 
 def _entry(given: Given, common: Mapping[str, tuple[str, ...]], verbs: Verbs) -> Entry:

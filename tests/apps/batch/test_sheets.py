@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from toonset.apps.batch.sheets import clean_name, list_sheets
+from toonset.apps.batch.given import clean_name
+from toonset.apps.batch.sheets import list_sheets
 from toonset.apps.batch.stages import Entry
 from toonset.cli.common.verb_stages import VERBS
 from toonset.errors import ToonsetError
