@@ -192,7 +192,7 @@ def _plan(table: Table, wanted: Wanted, tell: Teller) -> None:
 def _there(wanted: Wanted, plans: Sequence[Plan]) -> Mapping[str, set[str]]:
     """Return which stages of sheets are done with the keys that are planned, as stamps say."""
     from toonset.apps.batch.dispatch import home_of
-    from toonset.apps.batch.job import read_stamp
+    from toonset.apps.batch.stamps import read_stamp
     from toonset.apps.batch.storage import keys_behind
 
     behind: Mapping[str, str] = {}

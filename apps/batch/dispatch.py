@@ -18,9 +18,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Protocol
 
-from toonset.apps.batch.job import Job, Outcome, read_stamp, tidy
+from toonset.apps.batch.job import Job, Outcome, tidy
 from toonset.apps.batch.rows import SheetRow, StageRow, State
 from toonset.apps.batch.stages import dependents
+from toonset.apps.batch.stamps import read_stamp
 from toonset.apps.batch.table import BAD, Table
 from toonset.errors import OutputError, ToonsetError
 

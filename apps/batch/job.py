@@ -10,16 +10,11 @@ from __future__ import annotations
 import base64
 import contextlib
 import errno
-import faulthandler
 import hashlib
 import itertools
-import json
 import os
-import re
-import resource
 import shutil
 import sys
-import threading
 import time
 import traceback
 from collections.abc import Iterator, Mapping, Sequence
@@ -28,19 +23,15 @@ from pathlib import Path
 from typing import Any, Literal
 
 from toonset import lock
+from toonset.apps.batch.logged import BEGINS, forget_peak, last_lines, logged, peak_mb
 from toonset.apps.batch.rows import StageRow
 from toonset.apps.batch.stages import BUNDLE, STAGES, Verbs, dependents, line_of, value_of
-from toonset.errors import OutputError, ToonsetError, one_line, printable
+from toonset.apps.batch.stamps import read_stamp, remove_stamps, stages_there, stamp_of
+from toonset.errors import OutputError, ToonsetError, one_line
 from toonset.write import write_json
 
 LOG, SCRATCH = "log.txt", ".scratch"  # in a sheet's folder
-BEGINS, BEGUN = "--- ", re.compile(rb"(?m)^--- ([a-z]+)$")  # lines that say which stage is run
-OVER_MEMORY = "batch: took more than"  # begins the line that says so
 PATIENCE_S = 30.0  # for the worker of a batch that has just been killed
-FATAL = "Fatal Python error"  # begins what faulthandler says of a crash, the last call first
-GUARD_S = 0.1  # between looks at the memory in use
-LINES, CHARACTERS = 12, 2000  # of a log that are kept
-READ = 1 << 16  # bytes of its end that are looked at: a crash names all modules
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)  # whoever says so; another is an input's too
 FINE = (0, 3)  # exit codes of verbs that have written
 Kind = Literal["done", "failed", "busy", "place", "gone"]
@@ -102,7 +93,7 @@ def run_sheet(job: Job, verbs: Verbs) -> Outcome:
     home = Path(job.home)
     try:
         home.mkdir(parents=True, exist_ok=True)
-        with lock.hold(home / "batch", home, PATIENCE_S), _logged(home / LOG, job.memory_mb):
+        with lock.hold(home / "batch", home, PATIENCE_S), logged(home / LOG, job.memory_mb):
             _sweep(home)
             outcome = _run_near(job, home, verbs)
     except OutputError as error:
@@ -156,13 +147,13 @@ def _run_stages(job: Job, home: Path, verbs: Verbs) -> Outcome:
     for stage, key in job.keys.items():
         row = read_stamp(home, stage, key)
         if row is None and stage not in cut:
-            _remove_stamps(home, stage)
+            remove_stamps(home, stage)
             ended = _run_stage(job, home, stage, key, verbs)
             if isinstance(ended, Outcome):
                 return replace(ended, rows=tuple(rows), pictures=_pictures(home))
             row = ended
             if row.state == "done":
-                write_json(_stamp(home, stage), asdict(row))
+                write_json(stamp_of(home, stage), asdict(row))
             else:
                 cut |= {*dependents(stage)}
         rows += [row] if row is not None else []
@@ -177,7 +168,7 @@ def _run_stage(job: Job, home: Path, stage: str, key: str, verbs: Verbs) -> Stag
     row = StageRow(stage, key, attempts=1, worker=f"{os.uname().nodename}:{os.getpid()}")
     print(f"{BEGINS}{stage}", file=sys.stderr)
     print(line_of(stage, given, job.sheets, home), file=sys.stderr, flush=True)
-    _forget_peak()
+    forget_peak()
     began, cpu = time.monotonic(), time.process_time()
     said: Mapping[str, Any] = {}
     code, line, full, is_held = 0, "", False, False
@@ -199,7 +190,7 @@ def _run_stage(job: Job, home: Path, stage: str, key: str, verbs: Verbs) -> Stag
         ended=time.time(),
         wall_s=round(time.monotonic() - began, 4),
         cpu_s=round(time.process_time() - cpu, 4),
-        peak_mb=round(_peak_mb(), 1),
+        peak_mb=round(peak_mb(), 1),
     )
     if full:
         return Outcome(job.name, "place", line=line)
@@ -241,40 +232,6 @@ def _facts(stage: str, said: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
             "reasons": list(verdict["reasons"]),
         }
     return "", {}
-
-
-# ---- stamps --------------------------------------------------------------------------------------
-
-
-def stages_there(home: Path) -> set[str]:
-    """Return the stages whose stamps and results lie in a sheet's folder."""
-    return {stage for stage in STAGES if _is_there(home, stage)}
-
-
-def _is_there(home: Path, stage: str) -> bool:
-    result = home / STAGES[stage].writes / STAGES[stage].mark
-    return _stamp(home, stage).is_file() and result.exists()
-
-
-def read_stamp(home: Path, stage: str, key: str) -> StageRow | None:
-    """Return the row of a stage that is done with a key; None where it is not."""
-    if not _is_there(home, stage):
-        return None
-    try:
-        row = StageRow(**json.loads(_stamp(home, stage).read_bytes()))
-    except (OSError, ValueError, TypeError):  # cut short, or of an older toonset
-        return None
-    return row if row.key == key else None
-
-
-def _stamp(home: Path, stage: str) -> Path:
-    return home / f"{stage}.json"
-
-
-def _remove_stamps(home: Path, first: str) -> None:
-    """Remove what says that a stage, and what is made of its result, is done."""
-    for stage in (first, *dependents(first)):
-        _stamp(home, stage).unlink(missing_ok=True)
 
 
 def _sweep(home: Path) -> None:
@@ -320,96 +277,3 @@ def _pictures(home: Path) -> dict[str, str]:
         if "render" in there:
             found[".turn.webp"] = turn_thumbnail(home / STAGES["render"].writes)
     return {name: base64.b64encode(data).decode() for name, data in found.items()}
-
-
-# ---- the process ---------------------------------------------------------------------------------
-
-
-@contextlib.contextmanager
-def _logged(file: Path, memory_mb: int) -> Iterator[None]:
-    """Let all that is printed go to a file, and end the process when it takes too much memory."""
-    sys.stdout.flush()
-    sys.stderr.flush()
-    kept = [os.dup(1), os.dup(2)]
-    log = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o666)
-    streams = sys.stdout, sys.stderr
-    done = threading.Event()
-    guard = threading.Thread(target=_guard, args=(memory_mb, done), daemon=True)
-    try:
-        for number in (1, 2):
-            os.dup2(log, number)
-        sys.stdout, sys.stderr = (open(n, "w", closefd=False, errors="replace") for n in (1, 2))
-        faulthandler.disable()  # libraries may have put handlers of their own over it
-        faulthandler.enable(2, all_threads=False)
-        if memory_mb:
-            guard.start()
-        yield
-    finally:
-        done.set()
-        sys.stdout.flush()
-        sys.stderr.flush()
-        sys.stdout, sys.stderr = streams
-        for number, descriptor in zip((1, 2), kept, strict=True):
-            os.dup2(descriptor, number)
-            os.close(descriptor)
-        os.close(log)
-
-
-def _guard(memory_mb: int, done: threading.Event) -> None:
-    """End the process when it takes more memory than it may."""
-    while not done.wait(GUARD_S):
-        if _memory_mb() > memory_mb:
-            os.write(2, f"\n{OVER_MEMORY} {memory_mb} MB of memory\n".encode())
-            os._exit(1)
-
-
-def _memory_mb() -> float:
-    """Return the memory in use: on Linux now, elsewhere the most so far."""
-    try:
-        pages = int(Path("/proc/self/statm").read_bytes().split()[1])
-    except OSError:
-        return _peak_mb()
-    return pages * resource.getpagesize() / 2**20
-
-
-def _forget_peak() -> None:
-    """Let the process' peak of memory start anew, where the system can."""
-    with contextlib.suppress(OSError):
-        Path("/proc/self/clear_refs").write_bytes(b"5")
-
-
-def _peak_mb() -> float:
-    try:
-        status = Path("/proc/self/status").read_text()
-        return int(status.split("VmHWM:")[1].split()[0]) / 1024
-    except (OSError, IndexError):
-        unit = 2**20 if sys.platform == "darwin" else 2**10
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
-
-
-def last_lines(log: Path) -> str:
-    """Return the end of what a sheet's worker has printed."""
-    try:
-        text = log.read_bytes()[-READ:].decode("utf-8", "replace")
-    except OSError:
-        return ""
-    lines = [printable(line) for line in text.splitlines() if line.strip()]
-    fatal = next((i for i, line in enumerate(lines) if line.startswith(FATAL)), None)
-    kept = lines[-LINES:] if fatal is None else lines[max(fatal - 2, 0) :][:LINES]
-    return "\n".join(kept)[:CHARACTERS]
-
-
-def over_memory(log: str) -> str:
-    """Return the line by which a worker ended itself for the memory it took, or ""."""
-    found = (line for line in log.splitlines() if line.startswith(OVER_MEMORY))
-    said = next(found, "").removeprefix("batch: ")
-    return f"{said}; raise --memory-limit, then --retry-failed" if said else ""
-
-
-def last_stage(log: Path) -> str:
-    """Return the stage that was run last, as a log says; "" of none."""
-    try:
-        found = [name.decode() for name in BEGUN.findall(log.read_bytes())]
-    except OSError:
-        return ""
-    return next((name for name in reversed(found) if name in STAGES), "")

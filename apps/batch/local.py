@@ -19,7 +19,8 @@ from multiprocessing.connection import Connection, Pipe, wait
 from pathlib import Path
 from typing import Any
 
-from toonset.apps.batch.job import LOG, Job, Outcome, last_lines, last_stage, over_memory
+from toonset.apps.batch.job import LOG, Job, Outcome
+from toonset.apps.batch.logged import last_lines, last_stage, over_memory
 from toonset.apps.batch.rows import StageRow
 from toonset.write import ENDINGS
 

@@ -2,8 +2,8 @@
 
 A sheet is claimed as a whole, by one UPDATE, under a lease that its runner renews; a runner is one
 `toonset batch` with its workers. Who dies loses its leases, not its results: those are folders that
-appear by a rename, each with a stamp beside it (`toonset.apps.batch.job`), and whoever claims the
-sheet next finds them. How the file is opened and shared: `toonset.apps.batch.table_file`.
+appear by a rename, each with a stamp beside it (`stamps`), and whoever claims the sheet next finds
+them. How the file is opened and shared: `table_file`.
 """
 
 from __future__ import annotations

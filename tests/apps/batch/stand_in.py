@@ -13,10 +13,11 @@ from pathlib import Path
 from typing import Any
 
 from toonset.apps.batch.dispatch import Limits, Runner, home_of
-from toonset.apps.batch.job import run_sheet, stages_there
+from toonset.apps.batch.job import run_sheet
 from toonset.apps.batch.local import LocalWorkers
 from toonset.apps.batch.rows import Plan, SheetRow, StageRow
 from toonset.apps.batch.stages import STAGES, Entry
+from toonset.apps.batch.stamps import stages_there
 from toonset.apps.batch.table import Table
 from toonset.apps.batch.table_file import TABLE
 from toonset.cli.common.verb_stages import VERBS

@@ -17,6 +17,7 @@ from toonset.apps.batch.dispatch import Limits, Runner, alive, home_of, release_
 from toonset.apps.batch.job import Job, Outcome
 from toonset.apps.batch.local import LocalWorkers, usual_workers
 from toonset.apps.batch.rows import SheetRow
+from toonset.apps.batch.stamps import stages_there
 from toonset.apps.batch.table import Table
 from toonset.apps.batch.table_file import TABLE
 from toonset.errors import OutputError, ToonsetError
@@ -192,7 +193,7 @@ def test_a_redone_stage_takes_results_of_other_stages_with_it(tmp_path: Path) ->
     run_all(tmp_path, {"a": "ok"})
     row = run_all(tmp_path, {"a": "ok "}, stages=("calibrate", "export"))["a"]
     assert states(row) == {"calibrate": "done", "export": "done"}
-    assert job.stages_there(home_of(tmp_path, "a")) == {"calibrate", "export"}
+    assert stages_there(home_of(tmp_path, "a")) == {"calibrate", "export"}
 
 
 def test_a_failed_stage_is_not_forgotten_by_a_run_without_it(tmp_path: Path) -> None:
