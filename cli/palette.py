@@ -68,7 +68,7 @@ def palette(
     from toonset.dataset.label_drawings import label_drawings
     from toonset.dataset.split_folder.corrected import Given
     from toonset.dataset.split_folder.pictures import bundle_of, check_pictures, load_pictures
-    from toonset.palette.extract import rule_of
+    from toonset.palette.choice import rule_of
     from toonset.palette.pixels.ink_lines import find_contours
     from toonset.write import new_folder
 
@@ -161,7 +161,8 @@ def _painted(places: list[Path], printer: Printer) -> tuple[Palette, list[Painte
     """Return palette and drawings: a bundle's own, or found here."""
     from toonset.dataset.bundle.painted import Painted, read_painted
     from toonset.dataset.split_folder.pictures import bundle_of, load_pictures
-    from toonset.palette.extract import choose_palette, paint_maps
+    from toonset.palette.choice import choose_palette
+    from toonset.palette.extract import paint_maps
     from toonset.palette.pixels.ink_lines import find_contours
 
     bundle = bundle_of(places)

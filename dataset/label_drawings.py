@@ -9,13 +9,15 @@ from toonset.dataset.bundle.palette_files import write_labelled
 from toonset.dataset.split_folder.corrected import Given
 from toonset.dataset.split_folder.pictures import Pictures, load_pictures
 from toonset.errors import PaletteError, ToonsetError
+from toonset.palette.choice import choose_palette
 from toonset.palette.corrected import correct_palette
 from toonset.palette.corrections import PaletteCorrections
-from toonset.palette.extract import Map, PaintMap, choose_palette
+from toonset.palette.extract import PaintMap
 from toonset.palette.options import PaletteOptions
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.ink_lines import find_contours
 from toonset.palette.pixels.labels import Space
+from toonset.palette.sheet_palette import Map
 
 
 def label_drawings(

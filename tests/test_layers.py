@@ -27,7 +27,9 @@ FLOORS: dict[str, tuple[str, ...]] = {
         "pixels",
         "@corrections @named @plain_sheets formats paints",
         "@printed @shaded",
-        "@swatch_image",
+        "@sheet_palette @swatch_image",
+        "@stepped",
+        "@choice",
         "@extract",
         "@corrected @coverage @recolor",
     ),
@@ -95,7 +97,6 @@ LONG = {  # lines of the files that have more: they are only to become shorter
     "dataset/split/ruled_lines.py": 408,
     "dataset/split/sheet.py": 420,
     "dataset/split/warnings.py": 475,
-    "palette/extract.py": 516,
 }
 
 

@@ -138,7 +138,7 @@ def _parse(stage: str, words: Sequence[str], where: str) -> dict[str, Any]:
 def _check_values(values: Mapping[str, Any]) -> None:
     """Refuse what a verb refuses before it reads anything."""
     from toonset.dataset.split_folder.view_labels import parse_labels
-    from toonset.palette.extract import rule_of
+    from toonset.palette.choice import rule_of
 
     for given in values.values():
         options = given.over(given.kind()) if isinstance(given, Given) else given

@@ -9,9 +9,10 @@ import pytest
 
 from tests.palette.shaded import BOOTS, FACTOR, SKIN, TROUSERS, TUNIC, drawings
 from toonset.errors import PaletteError
+from toonset.palette.choice import choose_palette
 from toonset.palette.corrected import BY_HAND, correct_palette
 from toonset.palette.corrections import Divided, PaletteCorrections, Stroke
-from toonset.palette.extract import choose_palette, paint_maps
+from toonset.palette.extract import paint_maps
 from toonset.palette.names import hex_of
 from toonset.palette.pixels.ink_lines import find_contours
 

@@ -7,9 +7,10 @@ import pytest
 
 from tests.palette.pictures import block
 from toonset.errors import PaletteError
+from toonset.palette.choice import choose_palette
 from toonset.palette.corrected import correct_palette
 from toonset.palette.corrections import PaletteCorrections
-from toonset.palette.extract import choose_palette, extract_palette
+from toonset.palette.extract import extract_palette
 from toonset.palette.formats.json import to_json
 from toonset.palette.options import PaletteOptions
 from toonset.palette.palette import Palette

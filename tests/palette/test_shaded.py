@@ -7,10 +7,11 @@ import pytest
 
 from toonset.errors import PaletteError
 from toonset.nerf.look.paint_labels import paint_labels, repainted
+from toonset.palette.choice import choose_palette
 from toonset.palette.colors import oklab_from_rgb, rgb_from_oklab, shaded_oklab_from_rgb
 from toonset.palette.corrected import correct_palette
 from toonset.palette.corrections import Divided, PaletteCorrections
-from toonset.palette.extract import choose_palette, extract_palette, paint_maps
+from toonset.palette.extract import extract_palette, paint_maps
 from toonset.palette.formats.json import palette_of, to_json
 from toonset.palette.names import hex_of
 from toonset.palette.options import PaletteOptions

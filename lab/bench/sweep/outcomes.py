@@ -11,8 +11,9 @@ from lab.bench.split.cases import Drawn
 from lab.bench.split.score import same_box
 from toonset.dataset.split.sheet import Segmentation, split_picture
 from toonset.errors import ToonsetError
+from toonset.palette.choice import choose_palette
 from toonset.palette.colors import JUST_NOTICEABLE, oklab_from_rgb
-from toonset.palette.extract import choose_palette, paint_maps
+from toonset.palette.extract import paint_maps
 from toonset.palette.palette import Palette
 from toonset.palette.pixels.ink_lines import find_contours
 from toonset.view import Box

@@ -5,10 +5,11 @@ from functools import cache
 import numpy as np
 import pytest
 
+from toonset.palette.choice import choose_palette
 from toonset.palette.colors import oklab_from_rgb
 from toonset.palette.corrected import correct_palette
 from toonset.palette.corrections import PaletteCorrections
-from toonset.palette.extract import choose_palette, extract_palette, paint_maps
+from toonset.palette.extract import extract_palette, paint_maps
 from toonset.palette.formats.json import palette_of, to_json
 from toonset.palette.names import hex_of
 from toonset.palette.options import PaletteOptions
