@@ -7,30 +7,37 @@ letter is not a ruled line.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from itertools import combinations
+from dataclasses import replace
 
 import cv2
 import numpy as np
 from jaxtyping import Bool
 
 from toonset.dataset.split.figures.frames import LEAST_SIDE
+from toonset.dataset.split.lines import (
+    BROKEN_PX,
+    CROSSING,
+    LEAST_RUN_PX,
+    UPRIGHT,
+    Line,
+    crosses,
+    ends_with,
+    has_equals,
+    is_on,
+    is_open,
+    length_of,
+    open_columns,
+    paint_beside,
+)
+from toonset.dataset.split.rectangles import SHARED, THROUGHOUT, closed_lines, rectangle_sides
 
 LEAST_RUN = 0.04  # of the sheet's side along the line
-LEAST_RUN_PX = 24
 LEAST_SHEET = 100  # cells on the shorter side: on a smaller picture a line is part of a drawing
 THICKEST = 0.015  # of the sheet's shorter side
 BAR = 0.05  # of its height: one from edge to edge, on which figures stand
 THICKEST_PX = 6  # whatever the sheet's size
-CROSSING = 0.6  # of the sheet's width: a line this long needs no others
-SHARED = 0.3  # of its width: shorter, if several begin and end with it
-EQUALS = 4  # such lines
-UPRIGHT = 0.9  # of its height: the same; staffs and poles are shorter
 ALIKE = 0.8  # overlap of the runs of neighbouring rows
-OPEN = 0.5  # of the line's length with paper on both sides
-OPEN_UPRIGHT = 0.7  # the same of upright lines, which no figure stands behind
-OPEN_ACROSS = 0.2  # the same of a line that crosses the sheet, behind all figures
-OPEN_LIKE = 0.1  # the same of one that is like several others
+OPEN_LIKE = 0.1  # of the length of a line like several others: paper on both sides
 DASHES = 6  # flat pieces in a row: a dashed line
 EQUAL = 0.25  # of their length: dashes differ by less
 MOSTLY = 0.6  # of the dashes; figures cut some short
@@ -41,35 +48,7 @@ FAINT = 0.02  # of the sheet's width that they cover
 STANDING_OUT = 4  # times what rows have of them on the average: else they are a pencil's grain
 LONGEST_DASH = 0.1  # of the sheet's side
 JOINT = 0.02  # of the shorter side: corners may miss each other by so much
-THROUGHOUT = 0.75  # of the columns with paper above and below that a broken line crosses
 SOFT_PX = 3  # from figures: nearer to them a line's soft edge is left
-BROKEN_PX = 5  # gaps in a run that noise may leave
-
-
-@dataclass(frozen=True)
-class Line:
-    """A straight line of the sheet; rows and columns change roles for vertical ones.
-
-    Attributes:
-        first: its first row.
-        last: its last row.
-        start: its first column.
-        stop: the column after its last.
-        vertical: rows are columns.
-    """
-
-    first: int
-    last: int
-    start: int
-    stop: int
-    vertical: bool
-
-    @property
-    def box(self) -> tuple[int, int, int, int]:
-        """Return x, y, width, height."""
-        if self.vertical:
-            return self.first, self.start, self.last - self.first + 1, self.stop - self.start
-        return self.start, self.first, self.stop - self.start, self.last - self.first + 1
 
 
 def find_lines(paint: Bool[np.ndarray, "height width"]) -> list[Line]:
@@ -87,11 +66,11 @@ def find_lines(paint: Bool[np.ndarray, "height width"]) -> list[Line]:
         turned = np.ascontiguousarray(paint.T) if vertical else paint
         lines += _straight(turned, thickest, vertical=vertical)
         lines += _dashed(turned, thickest, vertical=vertical)
-    heights = [line for line in lines if _has_equals(line, lines, SHARED * width)]
-    free = [line for line in lines if _crosses(line, paint.shape) or line in heights]
-    closed = _closed(lines, free, JOINT * min(height, width) + thickest, heights)
+    heights = [line for line in lines if has_equals(line, lines, SHARED * width)]
+    free = [line for line in lines if crosses(line, paint.shape) or line in heights]
+    closed = closed_lines(lines, free, JOINT * min(height, width) + thickest, heights)
     shortest = LEAST_SIDE * min(height, width)
-    closed += _rectangles(paint, lines, shortest)
+    closed += rectangle_sides(paint, lines, shortest)
     return free + [
         line for line in closed if line not in free and line.stop - line.start >= shortest
     ]
@@ -105,7 +84,7 @@ def line_pixels(
     for line in lines:
         source, target = (paint.T, found.T) if line.vertical else (paint, found)
         columns = slice(line.start, line.stop)
-        above, below = _beside(source, line)
+        above, below = paint_beside(source, line)
         target[line.first : line.last + 1, columns] |= ~(
             (above & below) | _slanting(source, line, above, below)
         )
@@ -122,7 +101,7 @@ def _slanting(
     """Return the columns between which something slants through a line and goes on beyond it."""
     reach = line.last - line.first + 1
     farther = replace(line, first=line.first - 2 * reach, last=line.last + 2 * reach)
-    over, under = (_near(mask, 2 * reach) for mask in _beside(paint, farther))
+    over, under = (_near(mask, 2 * reach) for mask in paint_beside(paint, farther))
     over, under = over & above, under & below
     after = np.ones(2 * reach + 1)
     size = len(over)
@@ -155,9 +134,7 @@ def _straight(paint: np.ndarray, thickest: int, *, vertical: bool) -> list[Line]
     ]
     lines += _broken(paint, lines)
     shared = SHARED * paint.shape[1]
-    lines = [
-        line for line in lines if _is_open(paint, line, equals=_has_equals(line, lines, shared))
-    ]
+    lines = [line for line in lines if is_open(paint, line, equals=has_equals(line, lines, shared))]
     return lines if vertical else lines + _like_whole(paint, lines)
 
 
@@ -170,36 +147,36 @@ def _broken(paint: np.ndarray, lines: list[Line]) -> list[Line]:
     found, long = list[Line](), list[Line]()
     side = paint.shape[1]
     across = [line for line in lines if line.stop - line.start >= CROSSING * side]
-    whole = [line for line in across if _is_open(paint, line)]
+    whole = [line for line in across if is_open(paint, line)]
     levels = dict[int, list[Line]]()
     for line in lines:
         levels.setdefault(line.first, []).append(line)
-    for first, own in sorted(levels.items(), key=lambda level: (-_length(level[1]), level[0])):
-        last, vertical, length = max(line.last for line in own), own[0].vertical, _length(own)
+    for first, own in sorted(levels.items(), key=lambda level: (-length_of(level[1]), level[0])):
+        last, vertical, length = max(line.last for line in own), own[0].vertical, length_of(own)
         line = Line(first, last, min(x.start for x in own), max(x.stop for x in own), vertical)
         level = _level(paint, line, lines)
         apart = [other for other in whole if abs(other.first - first) > LEAST_RUN_PX]
-        if sum(_ends_with(level, other) for other in apart) > 1:  # a frame has one other side
+        if sum(ends_with(level, other) for other in apart) > 1:  # a frame has one other side
             line = level
-            if line not in whole and not any(_is_on(line, other) for other in found):
+            if line not in whole and not any(is_on(line, other) for other in found):
                 found.append(line)
         elif len(own) > 1 and length >= (UPRIGHT if vertical else SHARED) * side:
-            open_, rows = _open(paint, line), paint[first : last + 1, line.start : line.stop]
+            open_, rows = open_columns(paint, line), paint[first : last + 1, line.start : line.stop]
             if open_.any() and rows[:, open_].all(axis=0).mean() >= THROUGHOUT:
                 found.append(line)
         if line in found and (vertical or length >= CROSSING * side):
             long.append(line)
-    return [line for line in found if line in long or _has_equals(line, found, SHARED * side)]
+    return [line for line in found if line in long or has_equals(line, found, SHARED * side)]
 
 
 def _like_whole(paint: np.ndarray, lines: list[Line]) -> list[Line]:
     """Return levels that go on like several whole lines, though no piece of them is long."""
     across = [line for line in lines if line.stop - line.start >= CROSSING * paint.shape[1]]
-    whole = [line for line in across if _has_equals(line, across, SHARED * paint.shape[1])]
+    whole = [line for line in across if has_equals(line, across, SHARED * paint.shape[1])]
     if not whole:
         return []
     start, stop = whole[0].start, whole[0].stop
-    thin = min(line.last - line.first for line in whole if _ends_with(line, whole[0]))
+    thin = min(line.last - line.first for line in whole if ends_with(line, whole[0]))
     rows, middle = paint[:, start:stop], len(paint) - thin - 4
     if middle <= 0:
         return []
@@ -211,40 +188,20 @@ def _like_whole(paint: np.ndarray, lines: list[Line]) -> list[Line]:
         (paper >= OPEN_LIKE * (stop - start)) & (crossed >= THROUGHOUT * paper)
     )
     levels = [Line(int(row), int(row) + thin, start, stop, vertical=False) for row in first]
-    return [level for level in levels if not any(_is_on(level, other) for other in whole)]
-
-
-def _length(pieces: list[Line]) -> int:
-    return sum(line.stop - line.start for line in pieces)
+    return [level for level in levels if not any(is_on(level, other) for other in whole)]
 
 
 def _level(paint: np.ndarray, line: Line, lines: list[Line]) -> Line:
     """Return a line as far as pieces on its level go: it may drift, and short ones are no runs."""
     near = [x for x in lines if line.first - 1 <= x.first and x.last <= line.last + 1]
     drawn = paint[line.first : line.last + 1].any(axis=0)
-    drawn &= _open(paint, replace(line, start=0, stop=paint.shape[1]))
+    drawn &= open_columns(paint, replace(line, start=0, stop=paint.shape[1]))
     edges = np.diff(np.pad(drawn, 1).astype(np.int8))
     starts, stops = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
     long = stops - starts > BROKEN_PX
     start = min(starts[long].min(initial=len(drawn)), *(x.start for x in near))
     stop = max(stops[long].max(initial=0), *(x.stop for x in near))
     return replace(line, start=int(start), stop=int(stop))
-
-
-def _open(paint: np.ndarray, line: Line) -> Bool[np.ndarray, " columns"]:
-    """Return the columns of a line with paper above and below."""
-    above, below = _beside(paint, line)
-    return np.asarray(~above & ~below)
-
-
-def _ends_with(line: Line, other: Line) -> bool:
-    """Return whether two lines begin and end together."""
-    return max(abs(other.start - line.start), abs(other.stop - line.stop)) <= BROKEN_PX
-
-
-def _is_on(line: Line, other: Line) -> bool:
-    """Return whether two lines share rows, or touch."""
-    return line.first <= other.last + 1 and other.first <= line.last + 1
 
 
 def _dashed(paint: np.ndarray, thickest: int, *, vertical: bool) -> list[Line]:
@@ -300,110 +257,3 @@ def _stacked(runs: list[tuple[int, int, int]]) -> list[tuple[int, int, int, int]
             done += [band for band in growing if band[1] < row - 1]
             growing = [band for band in growing if band[1] >= row - 1]
     return done + growing
-
-
-def _is_open(paint: np.ndarray, line: Line, *, equals: bool = False) -> bool:
-    columns = slice(line.start, line.stop)
-    reach = line.last - line.first + 2
-    above = paint[max(line.first - 1 - reach, 0) : max(line.first - 1, 0), columns]
-    below = paint[line.last + 2 : line.last + 2 + reach, columns]
-    closed_above = above.all(axis=0) & bool(len(above))
-    closed_below = below.all(axis=0) & bool(len(below))
-    length = line.stop - line.start
-    across = equals or (not line.vertical and length >= CROSSING * paint.shape[1])
-    least = OPEN_ACROSS if across else OPEN_UPRIGHT if line.vertical else OPEN
-    return bool(np.mean(~closed_above & ~closed_below) >= least)
-
-
-def _beside(paint: np.ndarray, line: Line) -> tuple[np.ndarray, np.ndarray]:
-    """Return whether something is painted just above and just below each column of a line."""
-    columns = slice(line.start, line.stop)
-    nothing = np.zeros(line.stop - line.start, dtype=bool)
-    above = paint[line.first - 2, columns] if line.first >= 2 else nothing
-    below = paint[line.last + 2, columns] if line.last + 2 < len(paint) else nothing
-    return above, below
-
-
-def _crosses(line: Line, shape: tuple[int, ...]) -> bool:
-    length = line.stop - line.start
-    return length >= (UPRIGHT * shape[0] if line.vertical else CROSSING * shape[1])
-
-
-def _has_equals(line: Line, lines: list[Line], least: float) -> bool:
-    """Return whether level lines of a good length begin and end together, as height lines do."""
-    if line.vertical or line.stop - line.start < least:
-        return False
-    levels = sorted(
-        other.first for other in lines if not other.vertical and _ends_with(line, other)
-    )
-    return 1 + int((np.diff(levels) > LEAST_RUN_PX).sum()) >= EQUALS  # no line drawn by hand
-
-
-def _closed(lines: list[Line], free: list[Line], slack: float, heights: list[Line]) -> list[Line]:
-    """Return the lines both of whose ends meet lines across, until all do: rectangles, tables."""
-    kept = list(lines)
-    while True:
-        left = [line for line in kept if line in free or _is_joined(line, kept, slack, heights)]
-        if len(left) == len(kept):
-            return left
-        kept = left
-
-
-def _rectangles(paint: np.ndarray, lines: list[Line], shortest: float) -> list[Line]:
-    """Return the sides of rectangles that go on wherever the figures before them leave paper."""
-    across = _levels([line for line in lines if not line.vertical], SHARED * paint.shape[1])
-    upright = _levels([line for line in lines if line.vertical], SHARED * paint.shape[0])
-    found = dict[Line, None]()
-    for left, right in combinations(upright, 2):
-        sides = [replace(line, start=left.first, stop=right.last + 1) for line in across]
-        sides = [line for line in sides if line.stop - line.start >= shortest]
-        for top, bottom in combinations([line for line in sides if _goes_on(paint, line)], 2):
-            start, stop = top.first, bottom.last + 1
-            both = [replace(line, start=start, stop=stop) for line in (left, right)]
-            if stop - start >= shortest and all(_goes_on(paint.T, line) for line in both):
-                found |= dict.fromkeys([top, bottom, *both])
-    return list(found)
-
-
-def _levels(lines: list[Line], least: float) -> list[Line]:
-    """Return the levels, in order, on which pieces of such a length lie."""
-    pieces = list[list[Line]]()
-    for line in sorted(lines, key=lambda line: line.start - line.stop):
-        own = next((own for own in pieces if _is_on(line, own[0])), None)
-        if own is None:
-            pieces.append([line])
-        else:
-            own.append(line)
-    return sorted(
-        (
-            replace(own[0], first=min(x.first for x in own), last=max(x.last for x in own))
-            for own in pieces
-            if _length(own) >= least
-        ),
-        key=lambda line: line.first,
-    )
-
-
-def _goes_on(paint: np.ndarray, line: Line) -> bool:
-    """Return whether a line is drawn nearly wherever there is paper on both of its sides."""
-    open_, rows = _open(paint, line), paint[line.first : line.last + 1, line.start : line.stop]
-    drawn = rows[:, open_].all(axis=0)  # a line drawn by hand leaves its level
-    return bool(open_.mean() >= OPEN_ACROSS and drawn.mean() >= THROUGHOUT)
-
-
-def _is_joined(line: Line, others: list[Line], slack: float, heights: list[Line]) -> bool:
-    """Return whether both ends meet lines across; height lines have corners at their ends only."""
-    middle = (line.first + line.last) / 2
-    met = [
-        (other.first + other.last) / 2
-        for other in others
-        if other.vertical != line.vertical and _reaches(other, middle, slack, other in heights)
-    ]
-    return all(any(abs(place - end) <= slack for place in met) for end in (line.start, line.stop))
-
-
-def _reaches(line: Line, place: float, slack: float, at_ends: bool) -> bool:
-    """Return whether a line reaches a place along it, or has one of its ends there."""
-    if at_ends:
-        return min(abs(place - line.start), abs(place - line.stop)) <= slack
-    return line.start - slack <= place <= line.stop + slack
