@@ -20,8 +20,9 @@ import cv2
 import numpy as np
 from jaxtyping import UInt8
 
+from toonset.dataset.split.beside_views import FigureGroup, Swatch
 from toonset.dataset.split.figures.rows import Taken
-from toonset.dataset.split.sheet import FigureGroup, Segmentation, Swatch
+from toonset.dataset.split.sheet import Segmentation
 from toonset.palette.colors import JUST_NOTICEABLE, oklab_from_rgb
 from toonset.palette.names import RGB, hex_of, rgb_of_hex
 from toonset.view import Box

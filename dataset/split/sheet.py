@@ -6,11 +6,9 @@ The cost grows with the number of pixels, plus a little per figure.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated
 
 import numpy as np
 from jaxtyping import Bool, UInt8
-from pydantic import Field
 
 from toonset.dataset.silhouettes.line_width import contour_width_px
 from toonset.dataset.split.background import (
@@ -20,10 +18,17 @@ from toonset.dataset.split.background import (
     is_transparent,
     remove_residual_alpha,
 )
+from toonset.dataset.split.beside_views import (
+    NAMES,
+    FigureGroup,
+    LeftOut,
+    Swatch,
+    groups_of,
+    left_out_of,
+    swatches_of,
+)
 from toonset.dataset.split.crop import Crop, boxed_crops, found_crops, grid_crops
-from toonset.dataset.split.figures.blobs import as_box
 from toonset.dataset.split.figures.rows import LIKELIEST, Taken
-from toonset.dataset.split.figures.text_and_swatches import words
 from toonset.dataset.split.holes import BorderLook, open_holes, outline_look, with_paper
 from toonset.dataset.split.matting import cut_out, edge_softness_px
 from toonset.dataset.split.pages import Pages, find_pages
@@ -37,23 +42,10 @@ from toonset.dataset.split.warnings import (
 )
 from toonset.dataset.split.watermark import Watermark, find_watermark, remove_watermark
 from toonset.errors import SheetError
-from toonset.palette.palette import Hex
 from toonset.palette.pixels.enlarged import Grid, find_grid
 from toonset.view import Box, View
 
-Length = Annotated[int, Field(strict=True, ge=1, le=10**6)]  # pixels, as split.json may have them
-Place = Annotated[int, Field(strict=True, ge=0, le=10**6)]
-InSheet = tuple[Place, Place, Length, Length]
-LISTED = 0.02  # of the merit of the likeliest turnaround: groups with less are props
 LEAST_FIGURE_PX = 8  # pixels: a lower or narrower figure shows nothing
-
-NAMES = {
-    "text": "text beside the figures was",
-    "swatch": "patches of plain colour were",
-    "mark": "strokes beside the figures were",
-    "study": "smaller drawings were",
-    "speck": "small patches that belong to no figure were",
-}
 
 
 @dataclass(frozen=True)
@@ -82,52 +74,6 @@ class PictureOptions:
     grid: tuple[int, int] | None = None
     taken: Taken = LIKELIEST
     without: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class LeftOut:
-    """A patch of the sheet that is not a view.
-
-    Attributes:
-        box: (x, y, width, height) in the sheet.
-        kind: "text", "frame", "swatch", "study" (a head, a prop, a small extra drawing), "mark"
-            (an arrow, a rule) or "speck".
-    """
-
-    box: InSheet
-    kind: Annotated[str, Field(max_length=40)]
-
-
-@dataclass(frozen=True)
-class Swatch:
-    """A colour of the palette that a sheet prints.
-
-    Attributes:
-        box: (x, y, width, height) in the sheet.
-        color: 8-bit sRGB.
-    """
-
-    box: InSheet
-    color: Hex
-
-
-@dataclass(frozen=True)
-class FigureGroup:
-    """Equal figures of a sheet: a turnaround, or a row of busts, poses or props.
-
-    Attributes:
-        rows: (x, y, width, height) in the sheet of the figures of every row, from the top.
-        why: what speaks for it, for people.
-        likely: what speaks for it as a turnaround, beside the likeliest group: 0 to 1.
-        outfits: its rows show the same directions, so in other clothes.
-        taken: its figures are the views.
-    """
-
-    rows: tuple[tuple[InSheet, ...], ...]
-    why: Annotated[str, Field(max_length=200)]
-    likely: Annotated[float, Field(ge=0, le=1)]
-    outfits: bool = False
-    taken: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +139,7 @@ def split_picture(
     _check(found, ground, options)
     crops = _crops(found, paint, options)
     views, holes, papered = _views(rgba, ground, crops, options)
-    swatches, chosen = _swatches(found), options.taken != LIKELIEST
+    swatches, chosen = swatches_of(found), options.taken != LIKELIEST
     return Segmentation(
         tuple(views),
         ground.rgb,
@@ -201,7 +147,7 @@ def split_picture(
         (*page_warnings(pages), *mark_warnings(mark), *border_warnings(ground, found))
         + (() if by_hand else figure_warnings(found, views, rgba, chosen=chosen))
         + (() if by_hand else shadow_warnings(ground, views, rgba)),
-        () if by_hand else _left_out(found),
+        () if by_hand else left_out_of(found),
         (
             *_of_picture(pages, residual, mark),
             *_remarks(
@@ -210,7 +156,7 @@ def split_picture(
             ),
         ),
         swatches,
-        () if by_hand else _groups(found),
+        () if by_hand else groups_of(found),
     )
 
 
@@ -331,54 +277,6 @@ def _view(cut: UInt8[np.ndarray, "height width 4"], box: Box, name: str) -> View
     if not (cut[..., 3] >= 128).any():
         raise SheetError(f"view {name}: its figure is nearly transparent; make it opaque")
     return View(cut, box, contour_width_px(cut), name)
-
-
-def _left_out(found: SheetLayout) -> tuple[LeftOut, ...]:
-    """Return the patches that are not views, words as one each."""
-    boxes = [(box, "frame") for box in found.lines]
-    kinds = np.array(found.grouping.kinds, dtype=object)
-    for kind in NAMES:
-        own = found.blobs.boxes[kinds == kind]
-        boxes += [(as_box(box), kind) for box in (words(own) if kind == "text" else own)]
-    cell = found.cell_px
-    return tuple(
-        LeftOut((x * cell, y * cell, width * cell, height * cell), kind)
-        for (x, y, width, height), kind in boxes
-    )
-
-
-def _swatches(found: SheetLayout) -> tuple[Swatch, ...]:
-    printed, cell = found.grouping.printed, found.cell_px
-    return tuple(
-        Swatch((x * cell, y * cell, width * cell, height * cell), (red, green, blue))
-        for (x, y, width, height), (red, green, blue) in zip(
-            printed.boxes.tolist(), printed.rgb.tolist(), strict=True
-        )
-    )
-
-
-def _groups(found: SheetLayout) -> tuple[FigureGroup, ...]:
-    """Return the groups of figures without props and single drawings, in order."""
-    cell, most = found.cell_px, max((group.merit for group in found.groups), default=1.0)
-    worth = [len(one.members) > 1 and one.merit >= LISTED * most for one in found.groups]
-    shown = max(1, found.taken.group + 1, sum(worth[1:]) + 1)
-
-    def in_sheet(box: np.ndarray) -> InSheet:
-        x, y, width, height = (int(value) * cell for value in box)
-        return x, y, width, height
-
-    listed = []
-    for number, group in enumerate(found.groups[:shown]):
-        figures, rows = len(group.members), len(group.rows)
-        why = f"{figures} figure{'s' * (figures > 1)}" + (f" in {rows} rows" if rows > 1 else "")
-        why += f", {group.height * cell:.0f} px high"
-        if len(found.groups) > 1 and figures > 1:
-            why += f", outlines {100 * group.likeness**0.5:.0f} % alike"
-        boxes = tuple(tuple(map(in_sheet, found.blobs.boxes[row])) for row in group.rows)
-        listed.append(
-            FigureGroup(boxes, why, group.merit / most, group.outfits, number == found.taken.group)
-        )
-    return tuple(listed)
 
 
 def _of_picture(pages: Pages | None, residual: int, mark: Watermark | None) -> tuple[str, ...]:

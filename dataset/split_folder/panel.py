@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, UInt8
 
-from toonset.dataset.split.sheet import LeftOut
+from toonset.dataset.split.beside_views import LeftOut
 from toonset.dataset.split_folder.tags import Corners, Costs, Line, Rgb, draw_tag
 from toonset.raster import dilate
 from toonset.view import View

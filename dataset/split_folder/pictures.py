@@ -15,7 +15,8 @@ from toonset.dataset.bundle.calibration_schema import CalibrationFile, ViewRecor
 from toonset.dataset.bundle.palette_files import palette_title
 from toonset.dataset.bundle.transforms_read import NAMES, picture_paths, place_in, transforms_file
 from toonset.dataset.images.picture import load_rgba
-from toonset.dataset.split.sheet import Swatch, split_picture
+from toonset.dataset.split.beside_views import Swatch
+from toonset.dataset.split.sheet import split_picture
 from toonset.dataset.split_folder.places import is_split_folder, sheet_places
 from toonset.dataset.split_folder.read import read_split
 from toonset.errors import BundleError, PictureError, SheetError

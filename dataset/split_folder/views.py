@@ -9,7 +9,8 @@ from typing import Annotated
 
 from pydantic import Field
 
-from toonset.dataset.split.sheet import FigureGroup, LeftOut, Length, Segmentation, Swatch
+from toonset.dataset.split.beside_views import FigureGroup, LeftOut, Length, Swatch
+from toonset.dataset.split.sheet import Segmentation
 from toonset.palette.palette import Hex
 from toonset.view import View
 

@@ -21,7 +21,7 @@ from pydantic import BaseModel, Field, TypeAdapter, ValidationError
 from toonset import __version__
 from toonset.dataset.bundle.transforms_read import place_in
 from toonset.dataset.images.picture import encode_png
-from toonset.dataset.split.sheet import InSheet
+from toonset.dataset.split.beside_views import InSheet
 from toonset.dataset.split_folder.places import IMAGES, OVERLAY, SPLIT_FILE
 from toonset.dataset.split_folder.views import Source, Split
 from toonset.errors import SheetError

@@ -54,8 +54,9 @@ class Grouping:
     Attributes:
         figure_of_blob: (blobs,) number of the figure in reading order; -1 = none.
         count: number of figures.
-        kinds: per patch what it is if it is no figure's: see `toonset.dataset.split.sheet.LeftOut`;
-            "" for noise that is too small to name.
+        kinds: per patch what it is if it is no figure's, as
+            `toonset.dataset.split.beside_views.LeftOut` has it; "" for noise that is too small to
+            name.
         printed: the palette that the sheet prints.
     """
 

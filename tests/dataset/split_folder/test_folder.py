@@ -14,7 +14,8 @@ from PIL import Image, ImageDraw
 from toonset.dataset.images.folder import natural_key, picture_files
 from toonset.dataset.images.picture import encode_png
 from toonset.dataset.silhouettes.line_width import contour_width_px
-from toonset.dataset.split.sheet import LeftOut, Segmentation
+from toonset.dataset.split.beside_views import LeftOut
+from toonset.dataset.split.sheet import Segmentation
 from toonset.dataset.split_folder.boxes import read_boxes
 from toonset.dataset.split_folder.checks import odd_files
 from toonset.dataset.split_folder.read import read_split

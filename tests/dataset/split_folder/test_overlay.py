@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from toonset.dataset.split.sheet import LeftOut
+from toonset.dataset.split.beside_views import LeftOut
 from toonset.dataset.split_folder.overlay import draw_split
 from toonset.dataset.split_folder.panel import (
     FIGURES,

@@ -14,7 +14,8 @@ from lab.bench.split.measure import bench_split
 from lab.bench.split.methods import METHODS, Found, by_corner_color, by_toonset
 from lab.bench.split.score import mask_iou, same_box, score
 from toonset.dataset.images.picture import encode_png
-from toonset.dataset.split.sheet import LeftOut, PictureOptions, Segmentation
+from toonset.dataset.split.beside_views import LeftOut
+from toonset.dataset.split.sheet import PictureOptions, Segmentation
 from toonset.errors import BundleError, SheetError
 from toonset.view import View
 
