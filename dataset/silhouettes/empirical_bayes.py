@@ -195,7 +195,8 @@ def _energy(normal: Normal, prior: Prior, tau: float, numbers: Float[np.ndarray,
 
     precision = prior.precision
     potrf, potri = get_lapack_funcs(("potrf", "potri"), (normal.matrix,))
-    factor, _ = potrf(normal.matrix + prior.at(tau), lower=True)
+    factor, failed = potrf(normal.matrix + prior.at(tau), lower=True)
+    assert not failed, "normal equations that are not positive definite"
     spread, _ = potri(factor, lower=True)  # its lower half: half the work of an inverse
     twice = 2 * float(np.sum(np.tril(precision, -1) * spread))
     trace = twice + float(np.sum(np.diag(precision) * np.diag(spread)))

@@ -6,6 +6,7 @@ from itertools import combinations
 
 import cv2
 import numpy as np
+from jaxtyping import Int
 
 from toonset.dataset.split.figures.blobs import find_blobs
 from toonset.dataset.split.figures.parts_in_doubt import LEVEL
@@ -49,14 +50,19 @@ def two_heads(views: list[View]) -> list[str]:
     """
     said = []
     for view in views:
-        left, top, width, height = view.figure_box
-        x, y, depth = left - view.box[0], top - view.box[1], max(1, round(HEAD * height))
-        tops = find_blobs(view.mask[y : y + depth, x : x + width])
-        broad = np.bincount(tops.labels[-1], minlength=len(tops.areas) + 1)[1:]
-        heads = broad[(broad >= depth) & (tops.boxes[:, 1] <= OFF_ROW * height)]
-        if len(heads) > 1 and heads.sum() >= TWO_HEADS * width:
+        heads = tops_of(view, 1.0)
+        if len(heads) > 1 and heads.sum() >= TWO_HEADS * view.figure_box[2]:
             said.append(f"view {view.name} has two heads: do two figures touch?")
     return said
+
+
+def tops_of(view: View, broad: float) -> Int[np.ndarray, " tops"]:
+    """Return the widths, pixels, of a view's tops that are so many heads' heights wide or wider."""
+    left, top, width, height = view.figure_box
+    x, y, depth = left - view.box[0], top - view.box[1], max(1, round(HEAD * height))
+    tops = find_blobs(view.mask[y : y + depth, x : x + width])
+    wide = np.bincount(tops.labels[-1], minlength=len(tops.areas) + 1)[1:]
+    return wide[(wide >= broad * depth) & (tops.boxes[:, 1] <= OFF_ROW * height)]
 
 
 def _body_width(view: View) -> float:

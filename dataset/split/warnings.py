@@ -9,18 +9,14 @@ from toonset.dataset.split.background import SURE_ENOUGH, Background, ring_of
 from toonset.dataset.split.figures.open_outlines import LINE, Gap
 from toonset.dataset.split.figures.parts_in_doubt import parts_in_doubt
 from toonset.dataset.split.figures.shadows import dimmed, see_through
-from toonset.dataset.split.left_out_warnings import (
-    UPRIGHT,
-    like_views,
-    other_groups,
-    scattered_strokes,
-)
+from toonset.dataset.split.left_out_warnings import like_views, other_groups, scattered_strokes
 from toonset.dataset.split.pages import Pages
 from toonset.dataset.split.segment import SheetLayout, figure_cells
 from toonset.dataset.split.view_warnings import (
     is_level,
     off_row,
     one_in_another,
+    tops_of,
     two_heads,
     uneven_views,
     wide_views,
@@ -32,6 +28,7 @@ from toonset.view import View
 REACHING = 0.1  # of the sheet's border: so much may be figures that reach over its edge
 LEAST_SHADOW = 0.02  # of the height: so much lower than its row
 SHADED = 0.9  # of what is lower: it is shadow
+HEADS = 0.75  # of a head's height: the width of tops that may be heads
 FEET, LEAST_FOOT = 0.05, 1e-4  # of a figure's height, its lowest; squared: feet
 WHOLE = 0.6  # of the sheet that one view's box covers though there is text beside it
 WIDE_GAP = 0.05  # of the figure's height: a wider gap may be meant
@@ -228,8 +225,8 @@ def _whole_page(found: SheetLayout, views: list[View], rgba: np.ndarray) -> list
         return []
     if "text" in found.grouping.kinds:
         beside = ", with text beside it"
-    elif height < UPRIGHT * width and _stands_on(views[0]) > 2:
-        beside = " and stands on many feet"
+    elif len(tops_of(views[0], HEADS)) > 1 and _stands_on(views[0]) > 2:
+        beside = " and has two tops and many feet"
     else:
         return []
     return [

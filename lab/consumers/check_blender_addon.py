@@ -1,7 +1,7 @@
 """Check the add-on of `export --to blender-addon` inside Blender, with the real command.
 
     toonset export --to blender-addon -o addon.zip
-    HOME=/tmp/home python check_blender_addon.py addon.zip examples /path/of/toonset
+    HOME=/tmp/home python lab/consumers/check_blender_addon.py addon.zip examples /path/of/toonset
 
 With Blender installed as a Python module, or `blender -b --factory-startup --python FILE -- ...`.
 It is installed into the preferences of HOME: give it an empty one. Opens a sheet, finds its

@@ -7,11 +7,14 @@ import numpy as np
 import pytest
 
 from lab.bench.messy.sheet import make_messy_sheet
+from tests.dataset.split.test_grounds import opaque
 from toonset.dataset.split.background import find_background
 from toonset.dataset.split.figures.rows import LIKELIEST, Taken
 from toonset.dataset.split.segment import find_layout, find_paint
 from toonset.dataset.split.sheet import PictureOptions, split_picture
+from toonset.dataset.split.view_warnings import uneven_views
 from toonset.dataset.split.warnings import border_warnings
+from toonset.view import View
 
 
 def figure(height: int, shirt: tuple[int, int, int]) -> np.ndarray:
@@ -160,11 +163,12 @@ def test_two_views_of_which_one_is_much_lower_are_doubted() -> None:
 
 
 def test_one_of_several_views_that_is_much_lower_is_doubted_but_not_rows_of_all_heights() -> None:
-    heights = {(280, 278, 225): True, (280, 278, 262): False, (290, 222, 222): False}
+    heights = {(280, 278, 225): True, (280, 278, 262): False, (300, 220, 170): False}
     for tall, doubted in heights.items():
-        sheet = split_picture(sheet_of(*[figure(height, (200, 40, 40)) for height in tall]))
-        assert len(sheet.views) == len(tall)
-        assert any("as high as the others" in line for line in sheet.warnings) is doubted
+        drawn = [opaque(figure(height, (200, 40, 40))) for height in tall]
+        boxes = [(0, 0, one.shape[1], one.shape[0]) for one in drawn]
+        views = [View(one, box, 0.0, "") for one, box in zip(drawn, boxes, strict=True)]
+        assert any("as high as the others" in line for line in uneven_views(views)) is doubted
 
 
 def test_figures_that_overlap_all_over_the_sheet_are_doubted_and_a_wide_figure_is_not() -> None:
@@ -176,9 +180,15 @@ def test_figures_that_overlap_all_over_the_sheet_are_doubted_and_a_wide_figure_i
         page[24:304, x : x + 112, :3] = np.minimum(page[24:304, x : x + 112, :3], drawn)
     cv2.rectangle(page, (60, 120), (240, 150), (90, 60, 200, 255), -1)
     cv2.rectangle(one, (10, 120), (260, 140), (200, 40, 40, 255), -1)
-    for sheet, doubted in ((split_picture(page), True), (split_picture(one), False)):
+    animal = np.full((320, 300, 4), 255, np.uint8)
+    for first, last in (((20, 120), (280, 200)), ((20, 30), (110, 200))):  # trunk, and head
+        cv2.rectangle(animal, first, last, (150, 100, 60, 255), -1)
+    for leg in (24, 80, 190, 250):
+        cv2.rectangle(animal, (leg, 200), (leg + 24, 300), (150, 100, 60, 255), -1)
+    for picture, doubted in ((page, True), (one, False), (animal, False)):
+        sheet = split_picture(picture)
         assert len(sheet.views) == 1
-        assert any("many feet" in line for line in sheet.warnings) is doubted
+        assert any("two tops and many feet" in line for line in sheet.warnings) is doubted
 
 
 def test_small_whole_figures_beside_a_single_large_one_may_be_the_turnaround() -> None:
