@@ -109,7 +109,8 @@ def load(stages: Sequence[str]) -> None:
         package = importlib.import_module(f"toonset.{part}")
         for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
             importlib.import_module(module.name)
-    for name in ("PIL.Image", "trimesh.exchange.load", "skimage.measure"):
+    applications = ("toonset.apps.web.viewer.page",) if "view" in stages else ()
+    for name in (*applications, "PIL.Image", "trimesh.exchange.load", "skimage.measure"):
         importlib.import_module(name)
     importlib.import_module("PIL.Image").init()
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
@@ -39,9 +41,9 @@ class Lines:
             found.append(Normal(slope.T @ slope, slope.T @ off, squares, squares, len(off)))
         return found
 
-    def fit(self, rounds: int) -> Fit:
+    def fit(self, rounds: int, **options: Any) -> Fit:
         first = self.at(np.zeros((len(self.seen), 3)))
-        return empirical_bayes.fit(self.at, first, self.prior, TAU, rounds)
+        return empirical_bayes.fit(self.at, first, self.prior, TAU, rounds, **options)
 
 
 def test_one_step_finds_the_posterior_mean() -> None:
@@ -57,8 +59,8 @@ def test_the_gain_is_that_of_the_marginal_likelihood() -> None:
     wanted = 0.0
     for slope, seen in zip(lines.slopes, lines.seen, strict=True):
         with_errors = np.eye(40) + TAU**2 * slope @ COVARIANCE @ slope.T
-        wanted += multivariate_normal(np.zeros(40), with_errors).logpdf(seen)
-        wanted -= multivariate_normal(np.zeros(40), np.eye(40)).logpdf(seen)
+        wanted += multivariate_normal.logpdf(seen, np.zeros(40), with_errors)
+        wanted -= multivariate_normal.logpdf(seen, np.zeros(40), np.eye(40))
     assert lines.fit(2).gain_nats == pytest.approx(wanted, rel=1e-9)  # tau is not learned yet
 
 
@@ -96,3 +98,27 @@ def test_weights_are_the_slope_of_the_cost() -> None:
     for r, w in zip(residual, weight, strict=True):
         ahead, behind = (weighed(np.array([r + by]), 0.4, 100.0)[1] for by in (step, -step))
         assert (ahead - behind) / (4 * step) == pytest.approx(w * r, abs=1e-6)
+
+
+def test_half_steps_go_half_the_way_and_a_gauge_is_taken_off_every_step() -> None:
+    lines = Lines(TAU, 2)
+    whole, half = lines.fit(1), lines.fit(1, length=0.5)
+    np.testing.assert_allclose(half.numbers, whole.numbers / 2, rtol=1e-12)
+    level = lines.fit(3, gauge=lambda numbers: numbers - numbers.mean(axis=0))
+    np.testing.assert_allclose(level.numbers.mean(axis=0), 0, atol=1e-15)
+
+
+def test_rounds_end_where_they_no_longer_help() -> None:
+    lines = Lines(TAU, 2)
+    rounds = list[int]()
+
+    def at(numbers: Numbers, round_: int) -> list[Normal]:
+        rounds.append(round_)
+        return lines.at(numbers)
+
+    first = lines.at(np.zeros((2, 3)))
+    empirical_bayes.fit(at, first, lines.prior, TAU, 9, enough=0.99)
+    assert max(rounds) < 9
+    rounds.clear()
+    empirical_bayes.fit(at, first, lines.prior, TAU, 9)
+    assert max(rounds) == 9

@@ -105,7 +105,8 @@ def on_paper(paper: tuple[int, int, int], patch: tuple[int, int, int]) -> np.nda
 def test_a_patch_of_exactly_the_tinted_papers_colour_is_a_hole_whatever_is_round_it(
     paper: tuple[int, int, int], off: int, opens: bool
 ) -> None:
-    picture = on_paper(paper, (paper[0] - off,) * 3)
+    level = paper[0] - off
+    picture = on_paper(paper, (level, level, level))
     assert alpha_at(picture, 210, 220) == (0 if opens else 255)
     assert alpha_at(picture, 135, 170) == 255  # the white of the eye
 
