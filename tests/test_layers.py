@@ -243,17 +243,14 @@ def inner_modules(path: Path) -> set[str]:
     return found
 
 
-def attributes_of(path: Path) -> set[str]:
-    """Return `__import__`, and stages looked up as attributes of the package, in a source file."""
+def roundabout_imports(path: Path) -> set[str]:
+    """Return how a source file gets at stages other than by an import: see `imported_names`."""
     nodes = [*ast.walk(ast.parse(path.read_text(encoding="utf-8")))]
-    dotted_names = {ast.unparse(node) for node in nodes if isinstance(node, ast.Attribute)}
+    stages = {f"{package}.{stage}" for package in ("toonset", "ts") for stage in LAYERS}
+    looked_up = {ast.unparse(node) for node in nodes if isinstance(node, ast.Attribute)} & stages
     called = {node.id for node in nodes if isinstance(node, ast.Name)} & {"__import__"}
-    return called | {
-        name
-        for name in dotted_names
-        for stage in LAYERS
-        if name in {f"toonset.{stage}", f"ts.{stage}"} and not callable(getattr(ts, stage, None))
-    }
+    named = {name for name in imported_names(path) if not name.startswith("importlib.metadata")}
+    return looked_up | called | ({name.split(".")[0] for name in named} & {"importlib", "pkgutil"})
 
 
 @pytest.mark.parametrize("app", INNER)
@@ -261,9 +258,7 @@ def test_application_sees_the_public_interface(app: str) -> None:
     found = set[str]()
     for path in (ROOT / "apps" / app.replace(".", "/")).glob("*.py"):
         names = imported_names(path)
-        named = {name for name in names if not name.startswith("importlib.metadata")}
-        roundabout = {name.split(".")[0] for name in named} & {"importlib", "pkgutil"}
-        assert not roundabout | attributes_of(path), path.relative_to(ROOT)
+        assert not roundabout_imports(path), path.relative_to(ROOT)
         public = {name for name in names if name.count(".") == 1 and name.startswith("toonset.")}
         known = {*dir(ts), *(file.stem for file in (ROOT / "toonset").glob("*.py")), *LAYERS}
         assert {name.split(".")[1] for name in public} <= known, path.relative_to(ROOT)

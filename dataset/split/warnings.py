@@ -29,7 +29,6 @@ REACHING = 0.1  # of the sheet's border: so much may be figures that reach over 
 LEAST_SHADOW = 0.02  # of the height: so much lower than its row
 SHADED = 0.9  # of what is lower: it is shadow
 HEADS = 0.75  # of a head's height: the width of tops that may be heads
-FEET, LEAST_FOOT = 0.05, 1e-4  # of a figure's height, its lowest; squared: feet
 WHOLE = 0.6  # of the sheet that one view's box covers though there is text beside it
 WIDE_GAP = 0.05  # of the figure's height: a wider gap may be meant
 LARGE_POCKET = 0.01  # of the figure's squared height: so much more or less changes it
@@ -225,22 +224,14 @@ def _whole_page(found: SheetLayout, views: list[View], rgba: np.ndarray) -> list
         return []
     if "text" in found.grouping.kinds:
         beside = ", with text beside it"
-    elif len(tops_of(views[0], HEADS)) > 1 and _stands_on(views[0]) > 2:
-        beside = " and has two tops and many feet"
+    elif len(tops_of(views[0], HEADS)) > 1:
+        beside = " and has two tops"
     else:
         return []
     return [
         f"view {views[0].name} is most of the sheet{beside}: does it hold more than "
         "one figure? crop the sheet to the figures, or give them with --boxes"
     ]
-
-
-def _stands_on(view: View) -> int:
-    """Return in how many parts a figure stands."""
-    left, top, width, height = view.figure_box
-    x, y, low = left - view.box[0], top - view.box[1], max(1, round(FEET * height))
-    _, areas = sized_parts(view.mask[y + height - low : y + height, x : x + width])
-    return int((areas[1:] > LEAST_FOOT * height**2).sum())
 
 
 def _panels(views: list[View], rgba: np.ndarray) -> list[str]:

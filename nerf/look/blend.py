@@ -20,13 +20,14 @@ from jaxtyping import Bool, Float, Int, UInt8
 from toonset.camera import Camera
 from toonset.nerf.hull.mannequin_shape import FINER, Shape
 from toonset.nerf.look.asked import flanking, looks_of, own_part
-from toonset.nerf.look.borders import Unlined, missing_lines, missing_steps, settled
-from toonset.nerf.look.choose import Look, choose, filled_from, joints, mixed, shared_groups
+from toonset.nerf.look.border_lines import Unlined, missing_lines, missing_steps
+from toonset.nerf.look.choose import Look, choose, filled_from, mixed, shared_groups
 from toonset.nerf.look.crisp_depth import crisp_depth
 from toonset.nerf.look.drawings import STEP, Drawings
 from toonset.nerf.look.drawn_view import DRAWN, GUESSED, MIRRORED, SOLID, DrawnView, Geometry
 from toonset.nerf.look.features import lines_of
 from toonset.nerf.look.places import places_in, sample_picture
+from toonset.nerf.look.settle import discontinuities, settled
 from toonset.nerf.look.shade import smoothed
 from toonset.nerf.look.stamps import NEARER, Stamp, stamped, stamps, torn
 from toonset.nerf.look.surface import smooth_surface
@@ -152,8 +153,8 @@ def _drawn(drawings: Drawings, view: Geometry, border: float) -> DrawnView:
     color, labels = _extended(kept, color, labels, pen)
     if sight is None:
         inside = alpha > 0
-        meeting = joints(looks, np.where(kept, chosen, -1), inside)
-        color, labels = settled(color, labels, meeting, inside, pen, figure_px)
+        breaks = discontinuities(looks, np.where(kept, chosen, -1), inside)
+        color, labels = settled(color, labels, breaks, inside, pen, figure_px)
     stepped = sight is None and drawings.steps_hold
     if line is not None and (stepped or len(drawings.lined_pairs)):
         unlined = _unlined(looks, np.where(kept, chosen, -1), alpha > SOLID, figure_px)

@@ -35,7 +35,6 @@ TOUCHING = 0.2  # of the smaller of two groups: those that overlap less are two 
 OUTDONE, MOSTLY = 1e-6, 1e-3  # counts of others, and least one, where one drawing shows all
 ISLAND = 2e-3  # of the squared height: smaller patches of one drawing tear what they lie in
 ENOUGH_PX = 260  # height at which drawings are chosen well enough
-JUMP_PX = 2.5  # neighbouring pixels show places farther apart, in the view's pixels, across a step
 LIKE = 0.2  # of a channel: colours of two drawings that are nearer than this are averaged
 
 Mask = Bool[np.ndarray, "h w"]
@@ -310,32 +309,6 @@ def _cut(
     behind = np.ones(size, dtype=bool)
     behind[breadth_first_order(left, 0, return_predecessors=False)] = False
     own[inner] = np.where(behind[node[inner]], pair[1], pair[0])
-
-
-def joints(looks: Sequence[Look], chosen: Int[np.ndarray, "h w"], inside: Mask) -> Mask:
-    """Return the pixels beside which a view shows another drawing, or another place of the same.
-
-    Args:
-        looks: the drawings.
-        chosen: of them, -1 where none is shown.
-        inside: pixels of the figure; its outline is no joint.
-    """
-    x, y = (np.zeros(chosen.shape, np.float32) for _ in range(2))
-    for number, look in enumerate(looks):
-        here = (chosen == number).view(np.uint8)
-        for whole, its in ((x, look.x), (y, look.y)):
-            cv2.copyTo(np.float32(look.scale) * its, here, whole)
-    found = np.zeros(chosen.shape, dtype=bool)
-    for here, there in (
-        ((slice(None), slice(-1)), (slice(None), slice(1, None))),
-        ((slice(-1), slice(None)), (slice(1, None), slice(None))),
-    ):
-        off = cv2.max(cv2.absdiff(x[here], x[there]), cv2.absdiff(y[here], y[there]))
-        apart = (chosen[here] != chosen[there]) | (off > JUMP_PX)
-        apart &= inside[here] & inside[there]
-        found[here] |= apart
-        found[there] |= apart
-    return found
 
 
 def mixed(

@@ -12,7 +12,7 @@ from jaxtyping import Float, Float16, UInt8, UInt16
 from toonset.camera import Camera
 from toonset.dataset.silhouettes.mask import mask_of
 from toonset.nerf.hull.mannequin_shape import Shape
-from toonset.nerf.look.borders import lined_pairs
+from toonset.nerf.look.border_lines import lined_pairs
 from toonset.nerf.look.crisp_depth import SQUARE, filled
 from toonset.nerf.look.drawing import Drawing, depth_of, halved
 from toonset.nerf.look.outline import Outline

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from toonset.camera import Camera
-from toonset.nerf.look.borders import Unlined
+from toonset.nerf.look.border_lines import Unlined
 from toonset.nerf.look.crisp_depth import filled
 from toonset.nerf.look.features import Features, features_of
 from toonset.nerf.look.outline import without_crumbs

@@ -24,6 +24,7 @@ from tests.nerf.look.painted import (
     unseen,
     with_an_arm,
 )
+from toonset.nerf.look import blend
 from toonset.nerf.look.blend import _extended, blend_view
 from toonset.nerf.look.build import drawings_of
 from toonset.nerf.look.drawing import Original
@@ -251,6 +252,17 @@ def test_at_a_drawings_own_camera_the_view_is_that_drawing_whatever_the_surface(
         wanted = sheet / 255 * np.dstack([sheet[..., 3:] / 255] * 3 + [np.ones(sheet.shape[:2])])
         np.testing.assert_allclose(shown, wanted, atol=1 / 255)
         assert seen.share(DRAWN) == 1.0
+
+
+def test_a_view_settles_where_its_drawings_meet_and_only_there(
+    egg: Drawings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    between, own = (geometry(camera_at(yaw)) for yaw in (np.pi / 8, 0.0))
+    settled = [blend_view(egg, view).paint for view in (between, own)]
+    monkeypatch.setattr(blend, "settled", lambda color, labels, *_: (color, labels))
+    ragged = [blend_view(egg, view).paint for view in (between, own)]
+    assert (settled[0] != ragged[0]).any()
+    np.testing.assert_array_equal(settled[1], ragged[1])
 
 
 def test_what_only_mirror_images_show_is_told() -> None:

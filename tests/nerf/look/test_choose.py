@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from toonset.nerf.look.choose import JUMP_PX, Look, choose, joints, shared_groups
+from toonset.nerf.look.choose import Look, choose, shared_groups
 from toonset.nerf.look.view_lines import _afloat
 
 SIZE = 120
@@ -88,21 +88,3 @@ def test_the_face_that_is_stretched_less_leads() -> None:
 @pytest.mark.parametrize("middles", [(30, 90), (42, 78)])
 def test_faces_apart_or_just_touching_are_nobodys_business(middles: tuple[int, int]) -> None:
     assert shared_groups([face_at(0.5, middle) for middle in middles]) == []
-
-
-def test_joints_are_where_neighbours_show_other_drawings_or_other_places() -> None:
-    paint = np.full((*INSIDE.shape, 3), 0.6, np.float32)
-    looks = [look_at(paint, 0.5), look_at(paint, 0.5)]
-    chosen = np.where(X < 60, 0, 1)
-    assert np.flatnonzero(joints(looks, chosen, INSIDE).any(axis=0)).tolist() == [59, 60]
-    assert not joints(looks, np.zeros_like(chosen), INSIDE).any()
-    folded = X + np.float32(2 * JUMP_PX) * (Y > 30)
-    step = Look(looks[0].texture, folded, Y, INSIDE, 1.0, 1.0)
-    assert np.flatnonzero(joints([step], np.zeros_like(chosen), INSIDE).any(axis=1)).tolist() == [
-        30,
-        31,
-    ]
-    finer = Look(looks[0].texture, folded, Y, INSIDE, 1.0, 0.4)  # of a pixel of the view
-    assert not joints([finer], np.zeros_like(chosen), INSIDE).any()
-    disc = (X - 60) ** 2 + (Y - 60) ** 2 < 900
-    assert not joints(looks, np.where(disc, 0, -1), disc).any()  # an outline is no joint

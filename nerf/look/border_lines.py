@@ -1,9 +1,4 @@
-"""Settle the borders of paints where pieces of drawings meet in a view, and close their lines.
-
-A seam, a step of the surface and paint that goes on beyond what a drawing shows leave borders that
-are ragged by a few pixels. Beside such joints every pixel takes the paint that most of its
-neighbourhood has, and borders are softened by one pixel; thin lines count as much more as they must
-to keep their width.
+"""Close the lines between paints where a view has pieces of two drawings.
 
 The drawings tell of every pair of paints whether the artist draws a line along all of its borders.
 Where a view has such a border without a line, because a seam runs there, one is drawn. Pairs with a
@@ -15,9 +10,8 @@ drawn along deep steps in depth that no line is near.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from math import erf, sqrt
 
 import cv2
 import numpy as np
@@ -25,7 +19,7 @@ from jaxtyping import Bool, Float, UInt8, UInt16
 
 from toonset.nerf.look.features import lines_of
 from toonset.nerf.look.step_lines import step_places, step_sides
-from toonset.raster import broad_blur, dilate, distance_to, nearest, sized_parts, taken
+from toonset.raster import dilate, distance_to, nearest, sized_parts, taken
 
 LINED = 0.9  # of the border of two paints: they have a line
 LEAST = 0.05  # of the figure's height: shorter borders tell nothing
@@ -37,12 +31,6 @@ BESIDE = 0.01  # of the height: so far to both sides a step's paints are looked 
 ASTRAY = 0.015  # of the height: a drawn line so near an edge is its line
 GAP = 0.006  # of the height: edges go on over so much
 SOFT_PX = 1.0  # sigma that smooths them
-SETTLED = 0.004  # of the height: sigma of the neighbourhood that settles a ragged border
-LEAST_PX = 0.7  # of the same
-RAGGED = 2.0  # times this sigma: so far beside a joint borders are settled
-FINER = 0.6  # times this sigma: the neighbourhood in which lines count
-MOST = 4.0  # times paint: so much a thin line counts at most
-FAR = 1e-3  # share of a neighbourhood: a paint with less is not in it
 PAINTS = 256  # a pair is its lower paint times so many, and the higher one
 NONE = 0xFFFF  # no pair
 
@@ -169,78 +157,6 @@ def missing_steps(
         return np.zeros(gaps.shape, np.float32)
     away = cv2.GaussianBlur(distance_to(gaps), (0, 0), SOFT_PX)
     return np.where(unlined.inside, np.clip((pen_px + 1) / 2 - away, 0, 1), 0).astype(np.float32)
-
-
-def settled(
-    color: Float[np.ndarray, "height width 3"],
-    labels: Labels,
-    joints: Mask,
-    inside: Mask,
-    pen: tuple[float, tuple[int, int, int]] | None,
-    figure_px: float,
-) -> tuple[Float[np.ndarray, "height width 3"], Labels]:
-    """Return a view's paint with smooth borders at joints of its drawings; all else as it is.
-
-    Args:
-        color: straight, in [0, 1].
-        labels: of the paint.
-        joints: pixels at which pieces of drawings meet.
-        inside: pixels of the figure.
-        pen: of the drawings' lines, as wide as in the view; None: there are none.
-        figure_px: height of the figure.
-    """
-    sigma = max(LEAST_PX, SETTLED * figure_px)
-    band = dilate(joints, int(np.ceil(RAGGED * sigma))) & inside
-    if not band.any():
-        return color, labels
-    best, second = (np.full(band.shape, -1, np.float32) for _ in range(2))
-    first, other, kind = color.copy(), color.copy(), labels.copy()
-    lines = lines_of(color, pen, beside=False) & inside
-    ink = np.bincount(labels[lines], minlength=1).argmax()  # the label that lines have
-    room = int(np.ceil(3 * sigma))
-    for number, here, box in _kinds(labels, lines, inside, band, room):
-        at, own, here = band[box], color[box], here[box]
-        shares = here.astype(np.float32)
-        near = cv2.GaussianBlur(shares, (0, 0), sigma)
-        mean = broad_blur(own * shares[..., None], sigma) / np.maximum(near, 1e-4)[..., None]
-        shown = cv2.copyTo(own, here.view(np.uint8), mean)
-        if number is None and pen:  # an edge of a line beside paint stays where it is
-            fine = FINER * sigma
-            weight = min(MOST, 1 / erf(pen[0] / (fine * sqrt(2))))
-            near = weight * cv2.GaussianBlur(shares, (0, 0), fine)
-        near = np.where(near < FAR, -1, near)
-        leads, follows = at & (near > best[box]), at & (near > second[box])
-        for condition, values, kept in (
-            (follows, shown, other[box]),
-            (leads, first[box], other[box]),
-            (leads, shown, first[box]),
-        ):
-            cv2.copyTo(values, condition.view(np.uint8), kept)
-        second[box] = np.where(leads, best[box], np.maximum(near, second[box]))
-        best[box] = np.maximum(near, best[box])
-        kind[box][leads] = ink if number is None else number
-    away = (best - np.maximum(second, 0)) * sigma * np.float32(np.sqrt(np.pi / 2))  # pixels
-    part = np.clip(0.5 + away[band], 0, 1)[:, None]
-    found = color.copy()
-    found[band] = other[band] + part * (first[band] - other[band])
-    return found, np.where(band, kind, labels)
-
-
-def _kinds(
-    labels: Labels, lines: Mask, inside: Mask, band: Mask, room: int
-) -> Iterator[tuple[int | None, Mask, tuple[slice, slice]]]:
-    """Yield every paint near a band with its pixels and their box; None with thin lines."""
-    around = dilate(band, room) & inside
-    for number in (*np.unique(labels[around & ~lines]).tolist(), None):
-        here = around & (lines if number is None else (labels == number) & ~lines)
-        if here.any():
-            rows, columns = (np.flatnonzero(here.any(axis=axis)) for axis in (1, 0))
-            top, bottom, left, right = rows[0], rows[-1] + 1, columns[0], columns[-1] + 1
-            box = (
-                slice(max(0, top - room), bottom + room),
-                slice(max(0, left - room), right + room),
-            )
-            yield number, here, box
 
 
 def _hidden_edges(unlined: Unlined, depth: Depth, height: float) -> Mask:
