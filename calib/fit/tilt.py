@@ -17,6 +17,7 @@ from toonset.calib.outline.pose import PARAMETERS, Pose
 
 ROLL_SIGMA = np.radians(4.0)  # drawings stand upright
 LEVEL_SPREAD, P_STEEP = np.radians(3.0), 0.05
+P_LEVEL = 0.7  # that a sheet is drawn from eye level exactly
 STEEPEST = np.radians(50.0)  # elevation that sprites are drawn from
 
 
@@ -74,3 +75,11 @@ def elevation_log_prior(elevations: Float[np.ndarray, " n"]) -> Float[np.ndarray
     """Return how usual elevations >= 0 are, nats: eye level, or, of sprites, anything up to 50."""
     level = np.exp(-0.5 * (elevations / LEVEL_SPREAD) ** 2) * np.sqrt(2 / np.pi) / LEVEL_SPREAD
     return np.log((1 - P_STEEP) * level + P_STEEP / STEEPEST)
+
+
+def elevation_shares(elevations: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    """Return the prior probabilities of rising elevations, of which the first is eye level."""
+    shares = np.exp(elevation_log_prior(elevations)) * np.gradient(elevations)
+    shares *= (1 - P_LEVEL) / shares.sum()
+    shares[0] += P_LEVEL
+    return shares

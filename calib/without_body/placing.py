@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from toonset.calib.fit.tilt import LEVEL_SPREAD, elevation_log_prior
+from toonset.calib.fit.tilt import LEVEL_SPREAD, elevation_shares
 from toonset.calib.without_body.sideways import axis_columns
 from toonset.camera import Camera
 from toonset.dataset.silhouettes.hull_rays import Silhouette
@@ -166,10 +166,9 @@ def _elevation(figures: Figures, yaws: Float[np.ndarray, " views"]) -> tuple[flo
     Places up and down are not fitted first: from far enough above, moved drawings cohere whatever
     they show.
     """
-    worth = coherence_log_likelihood(figures.apart(yaws), len(yaws))
-    worth += elevation_log_prior(ELEVATIONS)
-    near = np.abs(ELEVATIONS - ELEVATIONS[worth.argmax()]) <= HUMP
-    shares = near * np.exp(worth - worth.max()) * np.gradient(ELEVATIONS)
+    likely = coherence_log_likelihood(figures.apart(yaws), len(yaws))
+    shares = elevation_shares(ELEVATIONS) * np.exp(likely - likely.max())
+    shares *= np.abs(ELEVATIONS - ELEVATIONS[shares.argmax()]) <= HUMP
     shares /= shares.sum()
     mean = float(shares @ ELEVATIONS)
     spread = float(np.sqrt(shares @ np.square(ELEVATIONS - mean)))
