@@ -9,8 +9,8 @@ where g are signed distances to the outlines. All are look-ups at the pixels whe
 so that cameras may stand anywhere.
 
 The widest runs of a row are the body's, and as deep as the side drawing. Others are limbs: they are
-at most LIMB_DEPTH times as deep as wide, where `limbs` says. What limbs hold out in the side
-drawing (fists) is not the body's.
+at most LIMB_DEPTH times as deep as wide, where `limbs` says, and reach as far as what they hold out
+in the side drawing (fists), which is not the body's.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from scipy import ndimage
 from toonset.nerf.sections.drawing import TALL, Drawing, Mask, cells, sample, signed_distance
 from toonset.nerf.sections.grid import NEAR_PX, Grid, Volume
 from toonset.nerf.sections.limbs import depths_of, slenderness
-from toonset.nerf.sections.runs import Outline, runs_of
+from toonset.nerf.sections.runs import Outline, parted, runs_of
 from toonset.nerf.sections.thin_parts import thin_parts, without_sections
 from toonset.raster import parts
 
@@ -48,12 +48,12 @@ def sections(grid: Grid, front: Drawing, side: Drawing | None, others: Sequence[
     if side is None:
         return _round_sections(grid, front)
     front_thin, side_thin = without_sections(front.mask, side.mask)
-    face = Outline.of(front, _some(front.mask & ~front_thin, front.mask))
+    face = Outline.of(front, parted(_some(front.mask & ~front_thin, front.mask)))
     profile = Outline.of(side, _some(side.mask & ~side_thin, side.mask))
     lead = face.runs.half >= LEAD * face.runs.widest()
     trunk = Outline.of(side, _without_fists(face, lead, profile.mask))
     width = slenderness(face.runs, front.mask)
-    depth, middle = depths_of(grid, face, profile, width, lead, others)
+    depth, middle = depths_of(grid, face, profile, profile.mask & ~trunk.mask, width, lead, others)
 
     at_front, at_side = front.pixels(grid.centres), side.pixels(grid.centres)
     g_front, g_side = sample(face.distance, at_front), sample(profile.distance, at_side)

@@ -2,7 +2,8 @@
 
 A limb is at most LIMB_DEPTH times as deep as wide. Along the ray through a run's middle its depth
 is where the diagonal drawings object least, where the side drawing shows the run's colour, and near
-the middle of the side drawing's run; the cost is blurred along the limb.
+the middle of the side drawing's run; the cost is blurred along the limb. What sticks out of the
+body in the side drawing is held by those limbs to which the diagonals let it belong.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ MOST_HOLD_PX = 24.0
 PAINT, MOST_APART = 800.0, 0.2  # px^2 per squared difference in colour, and the largest
 CENTRED = 0.02  # px^2 per squared px from the middle of the side drawing's run
 OUTSIDE = 1e4  # px^2: beyond the run
+HELD_OFF = 9.0  # px^2: by which diagonals may have elsewhere what a limb holds out
 ROWS, MEDIAN_ROWS, LAST_ROWS = 3.6, 10, 4.8  # blur of costs; median and blur of depths
 THICKNESS_PX = 2.0  # blur of the thickness
 FINE_RADII, RADII_STEP = 12, 3
@@ -34,6 +36,7 @@ def depths_of(
     grid: Grid,
     face: Outline,
     profile: Outline,
+    held: Mask,
     width: Float[np.ndarray, " n"],
     lead: Bool[np.ndarray, " n"],
     diagonals: Sequence[Drawing],
@@ -46,6 +49,7 @@ def depths_of(
         grid: depths are tried along its rays.
         face: the front drawing's body.
         profile: the side drawing's.
+        held: what limbs hold out of the body in the side drawing.
         width: half the width of what each run is of.
         lead: which runs are the body's.
         diagonals: drawings from between; there may be none.
@@ -67,8 +71,14 @@ def depths_of(
     best = smoothed(cost, links, ROWS).argmin(axis=1)[:, None]
     depth = np.take_along_axis(deep, best, axis=1)[:, 0]
     found = np.take_along_axis(places[..., 0], best, axis=1)[:, 0]
-    half[limb] = depth
-    middle[limb] = smoothed(median_along(found, links, MEDIAN_ROWS), links, LAST_ROWS)
+    found = smoothed(median_along(found, links, MEDIAN_ROWS), links, LAST_ROWS)
+    out = (sample(held.astype(np.float32), places) > 0.5).astype(np.float32)
+    objection = _objections(points, deep, diagonals) * out
+    out *= (objection.sum(axis=1) < HELD_OFF * out.sum(axis=1))[:, None]
+    low = np.where(out, places[..., 0], np.inf).min(axis=1)
+    high = np.where(out, places[..., 0], -np.inf).max(axis=1)
+    low, high = np.minimum(low, found - depth), np.maximum(high, found + depth)
+    half[limb], middle[limb] = (high - low) / 2, (high + low) / 2
     return half, middle
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from toonset.nerf.sections.runs import median_along, runs_of, smoothed
+from toonset.nerf.sections.runs import TOUCHING_PX, median_along, parted, runs_of, smoothed
 
 
 def mask_with_gaps(seed: int) -> np.ndarray:
@@ -50,6 +50,16 @@ def test_links_lead_along_a_limb_and_never_across() -> None:
     assert (runs.row[above] >= runs.row - 1).all()
     first = np.flatnonzero((runs.row == 5) & (runs.start == 7))
     assert above[first] == first  # the second limb begins there
+
+
+def test_a_limb_is_parted_where_it_touches_the_body_between_two_gaps() -> None:
+    mask = np.ones((3 * TOUCHING_PX, 30), bool)
+    mask[:TOUCHING_PX, 10:13] = mask[TOUCHING_PX + 6 :, 11:14] = False  # a gap that slants
+    assert (np.bincount(runs_of(mask).row) == 1).sum() == 6
+    assert (np.bincount(runs_of(parted(mask)).row) == 2).all()
+    mask[: TOUCHING_PX + 6] = True  # nothing above says that the gap goes on
+    assert (parted(mask) == mask).all()
+    assert not parted(np.zeros((5, 5), bool)).any()
 
 
 def test_blur_keeps_constants_and_has_the_width_that_it_says() -> None:

@@ -126,6 +126,13 @@ def test_a_diagonal_says_how_deep_a_limb_lies() -> None:
     assert (np.sign(solid.grid.at(solid.f, places)) == [-1, 1]).all()
 
 
+@pytest.mark.parametrize("yaws", [(FRONT, LEFT, BACK), (FRONT, DIAGONAL, LEFT, BACK)])
+def test_an_arm_reaches_as_far_as_what_it_holds_out(yaws: tuple[float, ...]) -> None:
+    forearm = ((0.95, 0.0, 0.4), (0.14, 0.14, 0.6))
+    solid = shape_of(sheet(yaws, [BODY, ARM, forearm]))
+    assert np.abs(off_surface(solid, *forearm)).mean() < 0.03
+
+
 def test_an_arm_beside_the_head_takes_no_depth_from_it() -> None:
     """A head sticks out over the trunk in the side drawing, as a fist would."""
     trunk, head = ((0.0, -0.1, 0.0), (0.25, 0.75, 0.1)), ((0.0, 0.8, 0.0), (0.25, 0.22, 0.3))
