@@ -28,6 +28,7 @@ from toonset.view import View
 REACHING = 0.1  # of the sheet's border: so much may be figures that reach over its edge
 LEAST_SHADOW = 0.02  # of the height: so much lower than its row
 SHADED = 0.9  # of what is lower: it is shadow
+SCRAP = 0.3  # of the sheet's height and width
 HEADS = 0.75  # of a head's height: the width of tops that may be heads
 WHOLE = 0.6  # of the sheet that one view's box covers though there is text beside it
 WIDE_GAP = 0.05  # of the figure's height: a wider gap may be meant
@@ -136,7 +137,7 @@ def figure_warnings(
         *off_row(views),
         *uneven_views(views),
         *one_in_another(views),
-        *_whole_page(found, views, rgba),
+        *_only_view(found, views, rgba),
         *_panels(views, rgba),
         *parts_in_doubt(
             *(found.blobs, found.grouping, rgba[:: found.cell_px, :: found.cell_px, :3]),
@@ -216,11 +217,17 @@ def _strokes(view: View) -> tuple[int, int] | None:
     return view.box[0] + int(columns[middle]), view.box[1] + int(rows[middle])
 
 
-def _whole_page(found: SheetLayout, views: list[View], rgba: np.ndarray) -> list[str]:
-    """Return a line if the only view may be a panel with all that is on it, or several figures."""
+def _only_view(found: SheetLayout, views: list[View], rgba: np.ndarray) -> list[str]:
+    """Return a line if the only view may be a scrap, a panel with all on it, or several figures."""
+    if len(views) > 1:
+        return []
     _, _, width, height = views[0].figure_box
-    covered = width * height >= WHOLE * rgba.shape[0] * rgba.shape[1]
-    if len(views) > 1 or not covered:
+    if max(height / rgba.shape[0], width / rgba.shape[1]) < SCRAP:
+        return [
+            f"view {views[0].name} is the only one and small on its sheet: are the figures fainter "
+            "or larger? crop the sheet to them, or give them with --boxes"
+        ]
+    if width * height < WHOLE * rgba.shape[0] * rgba.shape[1]:
         return []
     if "text" in found.grouping.kinds:
         beside = ", with text beside it"

@@ -72,12 +72,17 @@ def depths_of(
     depth = np.take_along_axis(deep, best, axis=1)[:, 0]
     found = np.take_along_axis(places[..., 0], best, axis=1)[:, 0]
     found = smoothed(median_along(found, links, MEDIAN_ROWS), links, LAST_ROWS)
-    out = (sample(held.astype(np.float32), places) > 0.5).astype(np.float32)
-    objection = _objections(points, deep, diagonals) * out
-    out *= (objection.sum(axis=1) < HELD_OFF * out.sum(axis=1))[:, None]
-    low = np.where(out, places[..., 0], np.inf).min(axis=1)
-    high = np.where(out, places[..., 0], -np.inf).max(axis=1)
-    low, high = np.minimum(low, found - depth), np.maximum(high, found + depth)
+    low, high = found - depth, found + depth
+    if diagonals:  # else nobody says which limb holds it
+        out = sample(held.astype(np.float32), places) > 0.5
+        objection = (_objections(points, deep, diagonals) * out).sum(axis=1)
+        out &= (objection < HELD_OFF * out.sum(axis=1))[:, None]
+        near = np.where(out, places[..., 0], np.inf).min(axis=1) - VOXEL_PX / 2
+        far = np.where(out, places[..., 0], -np.inf).max(axis=1) + VOXEL_PX / 2
+        joined = (out & (there == np.take_along_axis(there, best, axis=1))).any(axis=1)
+        beside = out.any(axis=1) & ~joined  # in the side drawing, too: there it is, and not here
+        low = np.where(beside, near, np.minimum(near, low))
+        high = np.where(beside, far, np.maximum(far, high))
     half[limb], middle[limb] = (high - low) / 2, (high + low) / 2
     return half, middle
 

@@ -68,6 +68,14 @@ def test_a_panel_with_text_beside_it_is_doubted_and_a_figure_alone_is_not() -> N
     assert any("most of the sheet" in line for line in split_picture(panel).warnings)
 
 
+def test_a_small_only_view_may_be_a_scrap_of_fainter_figures() -> None:
+    paper = np.full((300, 400, 4), 255, np.uint8)
+    paper[100:160, 180:204, :3] = figure(60, (40, 60, 120))
+    said = split_picture(paper).warnings
+    assert any("the only one and small on its sheet" in line for line in said)
+    assert split_picture(paper[80:180, 140:240].copy()).warnings == ()
+
+
 def test_figures_that_come_with_their_panels_are_doubted() -> None:
     page = np.full((340, 500, 4), 255, np.uint8)
     for x in (40, 270):
