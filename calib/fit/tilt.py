@@ -17,7 +17,7 @@ from toonset.calib.outline.pose import PARAMETERS, Pose
 
 ROLL_SIGMA = np.radians(4.0)  # drawings stand upright
 LEVEL_SPREAD, P_STEEP = np.radians(3.0), 0.05
-P_LEVEL = 0.7  # that a sheet is drawn from eye level exactly
+P_LEVEL = 0.7  # that a sheet is drawn from exactly eye level; to choose a turn it is not asked
 STEEPEST = np.radians(50.0)  # elevation that sprites are drawn from
 
 
@@ -78,7 +78,10 @@ def elevation_log_prior(elevations: Float[np.ndarray, " n"]) -> Float[np.ndarray
 
 
 def elevation_shares(elevations: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-    """Return the prior probabilities of rising elevations, of which the first is eye level."""
+    """Return the prior probabilities of two or more rising elevations, the first of them eye level.
+
+    A sheet is drawn from exactly there with P_LEVEL, else from anywhere in the mixture.
+    """
     shares = np.exp(elevation_log_prior(elevations)) * np.gradient(elevations)
     shares *= (1 - P_LEVEL) / shares.sum()
     shares[0] += P_LEVEL

@@ -28,7 +28,7 @@ from toonset.view import View
 REACHING = 0.1  # of the sheet's border: so much may be figures that reach over its edge
 LEAST_SHADOW = 0.02  # of the height: so much lower than its row
 SHADED = 0.9  # of what is lower: it is shadow
-SCRAP = 0.3  # of the sheet's height and width
+SCRAP = 0.3  # of the sheet's height and of its width: an only view is less of both
 HEADS = 0.75  # of a head's height: the width of tops that may be heads
 WHOLE = 0.6  # of the sheet that one view's box covers though there is text beside it
 WIDE_GAP = 0.05  # of the figure's height: a wider gap may be meant

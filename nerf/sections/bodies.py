@@ -9,8 +9,8 @@ where g are signed distances to the outlines. All are look-ups at the pixels whe
 so that cameras may stand anywhere.
 
 The widest runs of a row are the body's, and as deep as the side drawing. Others are limbs: they are
-at most LIMB_DEPTH times as deep as wide, where `limbs` says, and reach as far as what they hold out
-in the side drawing (fists), which is not the body's.
+at most LIMB_DEPTH times as deep as wide, where `limbs` says. What they hold out in the side drawing
+(fists) is not the body's; limbs reach as far where a diagonal drawing says whose it is.
 """
 
 from __future__ import annotations

@@ -64,7 +64,8 @@ def depths_of(
     there = profile.runs.number[cells(profile.mask.shape, places)]
     deep = np.minimum(profile.runs.half[there], half[limb, None])
     off = places[..., 0] - profile.runs.middle[there]
-    cost = _objections(points, deep, diagonals) + CENTRED * off**2
+    objections = _objections(points, deep, diagonals)
+    cost = objections + CENTRED * off**2
     cost += PAINT * _unlike(face, profile.drawing, places, limb)
     cost += OUTSIDE * (np.abs(off) > profile.runs.half[there] - deep + VOXEL_PX)
     links = _within(runs.links(limb), limb)
@@ -73,16 +74,17 @@ def depths_of(
     found = np.take_along_axis(places[..., 0], best, axis=1)[:, 0]
     found = smoothed(median_along(found, links, MEDIAN_ROWS), links, LAST_ROWS)
     low, high = found - depth, found + depth
-    if diagonals:  # else nobody says which limb holds it
-        out = sample(held.astype(np.float32), places) > 0.5
-        objection = (_objections(points, deep, diagonals) * out).sum(axis=1)
-        out &= (objection < HELD_OFF * out.sum(axis=1))[:, None]
-        near = np.where(out, places[..., 0], np.inf).min(axis=1) - VOXEL_PX / 2
-        far = np.where(out, places[..., 0], -np.inf).max(axis=1) + VOXEL_PX / 2
-        joined = (out & (there == np.take_along_axis(there, best, axis=1))).any(axis=1)
-        beside = out.any(axis=1) & ~joined  # in the side drawing, too: there it is, and not here
-        low = np.where(beside, near, np.minimum(near, low))
-        high = np.where(beside, far, np.maximum(far, high))
+    if diagonals and held.any():  # else nobody says which limb holds what
+        shown = sample(held.astype(np.float32), places) > 0.5
+        against = (objections * shown).sum(axis=1)
+        shown &= (against < HELD_OFF * shown.sum(axis=1))[:, None]
+        near = np.where(shown, places[..., 0], np.inf).min(axis=1) - VOXEL_PX / 2
+        far = np.where(shown, places[..., 0], -np.inf).max(axis=1) + VOXEL_PX / 2
+        gaps = np.cumsum(sample(profile.mask.astype(np.float32), places) <= 0.5, axis=1)
+        joined = (shown & (gaps == np.take_along_axis(gaps, best, axis=1))).any(axis=1)
+        elsewhere = shown.any(axis=1) & ~joined  # the side drawing has a gap between both
+        low = np.where(elsewhere, near, np.minimum(near, low))
+        high = np.where(elsewhere, far, np.maximum(far, high))
     half[limb], middle[limb] = (high - low) / 2, (high + low) / 2
     return half, middle
 

@@ -15,8 +15,8 @@ from jaxtyping import Bool, Float, Int
 
 from toonset.nerf.sections.drawing import TALL, Drawing, Mask, Picture, signed_distance
 
-TOUCHING_PX = round(0.1 * TALL)  # high: as far as a limb may touch the body
-SLANT_PX = 3  # by which the gaps above and below may lie beside each other
+TOUCHING_PX = round(0.1 * TALL)  # rows in which a limb may touch the body
+SLANT_PX = 3  # gaps above and below may lie twice as far beside each other
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,13 +136,14 @@ def runs_of(mask: Mask) -> Runs:
 def parted(mask: Mask) -> Mask:
     """Return a mask with limbs parted from the body where they touch between two gaps.
 
-    Above and below there is background between both, so that the border goes on between them.
+    Above and below there is background between both, so that the border goes on between them. Two
+    holes in a body, one above the other, part it, too.
     """
     right = np.maximum.accumulate(mask, axis=1)
     left = np.maximum.accumulate(mask[:, ::-1], axis=1)[:, ::-1]
     gaps = (~mask & right & left).astype(np.uint8)
     near, beside = (cv2.dilate(gaps, np.ones((1, 2 * px + 1))) for px in (SLANT_PX, 2 * SLANT_PX))
-    between = cv2.morphologyEx(near, cv2.MORPH_CLOSE, np.ones((TOUCHING_PX, 1)))
+    between = cv2.morphologyEx(near, cv2.MORPH_CLOSE, np.ones((TOUCHING_PX + 1, 1)))
     touching = (between > 0) & mask & (beside == 0)
     if not touching.any():
         return mask

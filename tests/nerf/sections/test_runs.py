@@ -52,12 +52,21 @@ def test_links_lead_along_a_limb_and_never_across() -> None:
     assert above[first] == first  # the second limb begins there
 
 
-def test_a_limb_is_parted_where_it_touches_the_body_between_two_gaps() -> None:
-    mask = np.ones((3 * TOUCHING_PX, 30), bool)
-    mask[:TOUCHING_PX, 10:13] = mask[TOUCHING_PX + 6 :, 11:14] = False  # a gap that slants
-    assert (np.bincount(runs_of(mask).row) == 1).sum() == 6
-    assert (np.bincount(runs_of(parted(mask)).row) == 2).all()
-    mask[: TOUCHING_PX + 6] = True  # nothing above says that the gap goes on
+@pytest.mark.parametrize(("rows", "beside", "parts"), [(6, 6, 2), (TOUCHING_PX, 0, 2), (6, 9, 1)])
+def test_a_limb_is_parted_where_it_touches_between_two_gaps(
+    rows: int, beside: int, parts: int
+) -> None:
+    mask = np.ones((80, 40), bool)
+    mask[:20, 10:13] = mask[20 + rows :, 10 + beside : 13 + beside] = False
+    touching = np.bincount(runs_of(parted(mask)).row)[20 : 20 + rows]
+    assert (touching == parts).all()
+
+
+def test_a_body_is_left_whole_where_no_gap_goes_on() -> None:
+    mask = np.ones((120, 40), bool)
+    mask[40:60, 10:13] = False
+    assert (parted(mask) == mask).all()
+    mask[60 + TOUCHING_PX + 1 :, 10:13] = False
     assert (parted(mask) == mask).all()
     assert not parted(np.zeros((5, 5), bool)).any()
 
