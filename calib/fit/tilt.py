@@ -17,7 +17,7 @@ from toonset.calib.outline.pose import PARAMETERS, Pose
 
 ROLL_SIGMA = np.radians(4.0)  # drawings stand upright
 LEVEL_SPREAD, P_STEEP = np.radians(3.0), 0.05
-P_LEVEL = 0.7  # that a sheet is drawn from exactly eye level; to choose a turn it is not asked
+P_LEVEL = 0.7  # that a sheet is drawn from exactly eye level; for its elevation, not its turn
 STEEPEST = np.radians(50.0)  # elevation that sprites are drawn from
 
 

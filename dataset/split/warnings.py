@@ -224,8 +224,8 @@ def _only_view(found: SheetLayout, views: list[View], rgba: np.ndarray) -> list[
     _, _, width, height = views[0].figure_box
     if max(height / rgba.shape[0], width / rgba.shape[1]) < SCRAP:
         return [
-            f"view {views[0].name} is the only one and small on its sheet: are the figures fainter "
-            "or larger? crop the sheet to them, or give them with --boxes"
+            f"view {views[0].name} is the only one, and small on its sheet: did the cut miss "
+            "fainter or larger figures? crop the sheet to them, or give them with --boxes"
         ]
     if width * height < WHOLE * rgba.shape[0] * rgba.shape[1]:
         return []

@@ -3,7 +3,7 @@
 A limb is at most LIMB_DEPTH times as deep as wide. Along the ray through a run's middle its depth
 is where the diagonal drawings object least, where the side drawing shows the run's colour, and near
 the middle of the side drawing's run; the cost is blurred along the limb. What sticks out of the
-body in the side drawing is held by those limbs to which the diagonals let it belong.
+body in the side drawing is held by the limbs at which no diagonal objects to it.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from toonset.nerf.sections.drawing import Drawing, Mask, cells, sample
 from toonset.nerf.sections.grid import VOXEL_PX, Grid
@@ -78,15 +78,39 @@ def depths_of(
         shown = sample(held.astype(np.float32), places) > 0.5
         against = (objections * shown).sum(axis=1)
         shown &= (against < HELD_OFF * shown.sum(axis=1))[:, None]
-        near = np.where(shown, places[..., 0], np.inf).min(axis=1) - VOXEL_PX / 2
-        far = np.where(shown, places[..., 0], -np.inf).max(axis=1) + VOXEL_PX / 2
-        gaps = np.cumsum(sample(profile.mask.astype(np.float32), places) <= 0.5, axis=1)
-        joined = (shown & (gaps == np.take_along_axis(gaps, best, axis=1))).any(axis=1)
-        elsewhere = shown.any(axis=1) & ~joined  # the side drawing has a gap between both
-        low = np.where(elsewhere, near, np.minimum(near, low))
-        high = np.where(elsewhere, far, np.maximum(far, high))
+        low, high = _reaching(profile.mask, places, shown, best, low, high)
     half[limb], middle[limb] = (high - low) / 2, (high + low) / 2
     return half, middle
+
+
+def _reaching(
+    side: Mask,
+    places: Float[np.ndarray, "n steps 2"],
+    shown: Bool[np.ndarray, "n steps"],
+    best: Int[np.ndarray, "n 1"],
+    low: Float[np.ndarray, " n"],
+    high: Float[np.ndarray, " n"],
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+    """Return where limbs begin and end with what they hold, px of the side drawing.
+
+    Limbs reach as far; where the side drawing has a gap between a limb's place and what it holds,
+    the limb is there alone.
+
+    Args:
+        side: the side drawing's body.
+        places: pixels of the side drawing along each limb's ray.
+        shown: at which of them it shows what the limb holds.
+        best: the step of each limb's own place.
+        low: where each limb begins by itself.
+        high: where it ends.
+    """
+    near = np.where(shown, places[..., 0], np.inf).min(axis=1) - VOXEL_PX / 2
+    far = np.where(shown, places[..., 0], -np.inf).max(axis=1) + VOXEL_PX / 2
+    gaps = np.cumsum(sample(side.astype(np.float32), places) <= 0.5, axis=1)
+    joined = (shown & (gaps == np.take_along_axis(gaps, best, axis=1))).any(axis=1)
+    elsewhere = shown.any(axis=1) & ~joined
+    low = np.where(elsewhere, near, np.minimum(near, low))
+    return low, np.where(elsewhere, far, np.maximum(far, high))
 
 
 def slenderness(runs: Runs, mask: Mask) -> Float[np.ndarray, " n"]:

@@ -72,7 +72,7 @@ def test_a_small_only_view_may_be_a_scrap_of_fainter_figures() -> None:
     paper = np.full((300, 400, 4), 255, np.uint8)
     paper[100:160, 180:204, :3] = figure(60, (40, 60, 120))
     said = split_picture(paper).warnings
-    assert any("the only one and small on its sheet" in line for line in said)
+    assert any("the only one, and small on its sheet" in line for line in said)
     assert split_picture(paper[80:180, 140:240].copy()).warnings == ()
 
 
